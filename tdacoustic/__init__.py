@@ -1,0 +1,43 @@
+"""tdacoustic: from the logs of a field test to a report on the noise of a traction drive.
+
+From a log to a plotted spectrum with its lines::
+
+    import tdacoustic as td
+
+    recording = td.read("run.h5")
+    spectrum = td.spectrum(recording, "mic_1")
+    lines = td.find_lines(spectrum)
+    td.plot(spectrum, lines)
+
+From a campaign to its tables as pandas frames: ``td.analyze("campaign.toml").tables["lines"]``.
+"""
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+
+_PUBLIC = {
+    "TdacousticError": "tdacoustic.errors",
+    "analyze": "tdacoustic.workflows.analyze",
+    "find_families": "tdacoustic.lines",
+    "find_lines": "tdacoustic.lines",
+    "load_campaign": "tdacoustic.campaign",
+    "plot": "tdacoustic.workflows.interactive",
+    "read": "tdacoustic.workflows.interactive",
+    "scan": "tdacoustic.formats",
+    "spectrum": "tdacoustic.workflows.interactive",
+}
+"""Public names and where they live; each is imported when it is first used."""
+
+__all__ = ["__version__", *_PUBLIC]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _PUBLIC:
+        return getattr(import_module(_PUBLIC[name]), name)
+    raise AttributeError(f"module 'tdacoustic' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,57 @@
+"""The exceptions of tdacoustic.
+
+All derive from `TdacousticError`, and each is also the built-in exception an
+ordinary ``except`` would expect. A message names the thing, its value, what is
+allowed and where it stands (file, channel, key).
+"""
+
+__all__ = [
+    "AnalysisError",
+    "CampaignError",
+    "FormatError",
+    "MissingFileError",
+    "OutputError",
+    "RecipeError",
+    "StoreError",
+    "TdacousticError",
+    "UnitError",
+]
+
+
+class TdacousticError(Exception):
+    """Root of every error that tdacoustic raises on purpose."""
+
+
+class FormatError(TdacousticError, ValueError):
+    """A log cannot be read: not the format it claims, truncated, or inconsistent."""
+
+
+class MissingFileError(TdacousticError, FileNotFoundError):
+    """A named file does not exist."""
+
+    def __str__(self) -> str:
+        return str(self.args[0]) if self.args else ""
+
+
+class UnitError(TdacousticError, ValueError):
+    """A unit or a sensitivity is unknown, missing, or of another quantity."""
+
+
+class CampaignError(TdacousticError, ValueError):
+    """A campaign file is wrong: unknown key, bad value, or contradiction."""
+
+
+class RecipeError(TdacousticError, ValueError):
+    """A synthesis recipe is wrong."""
+
+
+class AnalysisError(TdacousticError, ValueError):
+    """The data do not allow the analysis that was asked for."""
+
+
+class StoreError(TdacousticError, OSError):
+    """The store of results cannot be used."""
+
+
+class OutputError(TdacousticError, OSError):
+    """The output folder cannot be written, or something else is in its way."""

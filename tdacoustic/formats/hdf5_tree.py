@@ -1,0 +1,137 @@
+"""Which datasets of an HDF5 file can be channels; nothing outside the file is touched."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tdacoustic.formats.hdf5_attributes import Attributes
+from tdacoustic.formats.rates import snap_rate
+
+__all__ = ["Tree", "raster_of_time_vector", "read_tree"]
+
+MAX_COLUMNS = 1024
+MAX_OBJECTS = 100_000
+NAMES_IN_A_FLAG = 5
+TIME_NAMES = frozenset({"time", "t", "times", "time_s", "t_s", "zeit", "temps", "timestamps", "time_axis"})
+SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
+PROBES = 64
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Names of the datasets that can be channels, in the file's order, and what was left out."""
+
+    datasets: tuple[str, ...]
+    flags: tuple[str, ...]
+
+
+def read_tree(file: Any) -> Tree:
+    """Walk a file's hard links.
+
+    Parameters
+    ----------
+    file : h5py.File
+
+    Returns
+    -------
+    Tree
+    """
+    import h5py
+
+    datasets: list[str] = []
+    skipped: dict[str, list[str]] = {}
+    seen: set[Any] = {h5py.h5o.get_info(file.id).addr}
+    pending = [("", file["/"])]
+    count = 0
+    while pending:
+        prefix, group = pending.pop()
+        below = []
+        for key in group:
+            name = f"{prefix}{key}"
+            count += 1
+            if count > MAX_OBJECTS:
+                return Tree(
+                    tuple(datasets), (*_flags(skipped), f"more than {MAX_OBJECTS} objects: the rest is not read")
+                )
+            if not isinstance(group.get(key, getlink=True), h5py.HardLink):
+                skipped.setdefault("are links and were not followed", []).append(name)
+                continue
+            item = group[key]
+            address = h5py.h5o.get_info(item.id).addr
+            if address in seen:
+                skipped.setdefault("are second names of what was read already", []).append(name)
+                continue
+            seen.add(address)
+            if isinstance(item, h5py.Group):
+                below.append((f"{name}/", item))
+            elif isinstance(item, h5py.Dataset):
+                reason = _reason_to_skip(item)
+                if reason is None:
+                    datasets.append(name)
+                else:
+                    skipped.setdefault(reason, []).append(name)
+        pending.extend(reversed(below))
+    return Tree(tuple(datasets), _flags(skipped))
+
+
+def _flags(skipped: dict[str, list[str]]) -> tuple[str, ...]:
+    flags = []
+    for reason, names in skipped.items():
+        shown = ", ".join(names[:NAMES_IN_A_FLAG]) + (", ..." if len(names) > NAMES_IN_A_FLAG else "")
+        flags.append(f"{len(names)} skipped, they {reason}: {shown}")
+    return tuple(flags)
+
+
+def _reason_to_skip(dataset: Any) -> str | None:
+    """Why a dataset can be no channel, None if it can."""
+    if dataset.is_virtual:
+        return "are virtual: their data lie in other files"
+    if dataset.external:
+        return "have their data in other files"
+    if dataset.dtype.kind not in "iuf" or dataset.dtype.metadata:
+        return "are not numeric"
+    if dataset.shape is None or dataset.ndim == 0:
+        return "are single values"
+    if dataset.ndim > 2:
+        return "have more than two dimensions"
+    if max(dataset.shape) < 2 or min(dataset.shape) < 1:
+        return "have fewer than two samples"
+    if dataset.ndim == 2 and min(dataset.shape) > MAX_COLUMNS:
+        return f"are matrices of more than {MAX_COLUMNS} columns"
+    return None
+
+
+def raster_of_time_vector(name: str, dataset: Any) -> tuple[float, float, float | None] | str | None:
+    """Rate, start and raw rate that a time vector gives.
+
+    Only its ends and `PROBES` places between them are read.
+
+    Returns
+    -------
+    (float, float, float or None), str or None
+        A sentence where it is called a time but is not equidistant; None where it is no time vector.
+    """
+    if name.rpartition("/")[2].lower() not in TIME_NAMES or dataset.dtype.kind != "f":
+        return None
+    factor = SECONDS.get((Attributes(dataset).text("unit", "units", "wf_yunit") or "s").lower())
+    if factor is None:
+        return None
+    n_samples = len(dataset)
+    at = np.unique(np.linspace(0, n_samples - 1, min(PROBES, n_samples)).round().astype(np.int64))
+    ends = np.arange(min(PROBES, n_samples))
+    at = np.unique(np.concatenate([ends, at, n_samples - 1 - ends]))
+    probes = np.array([dataset[int(index)] for index in at], dtype=np.float64)
+    step = (probes[-1] - probes[0]) / (n_samples - 1)
+    if not np.isfinite(probes).all() or not step > 0.0:
+        return None
+    deviation = np.abs(probes - (probes[0] + step * at))
+    neighbours = np.diff(at) == 1
+    jump = np.abs(np.diff(probes)[neighbours] - step)
+    if deviation.max() > 0.5 * step or (jump.size and jump.max() > 0.5 * step):
+        return f"{name!r} is called a time but is not equidistant: it gives no sampling rate"
+    rounding = float(np.finfo(dataset.dtype).eps) * float(np.abs(probes).max()) / (probes[-1] - probes[0])
+    rate, raw = snap_rate(1.0 / (step * factor), rounding)
+    return rate, float(probes[0]) * factor, raw

@@ -1,0 +1,7 @@
+"""What a log becomes: channels on rasters, in SI, readable in blocks."""
+
+from tdacoustic.recording.log import Log, LogChannel, Reader
+from tdacoustic.recording.raster import Raster
+from tdacoustic.recording.recording import Channel, Recording
+
+__all__ = ["Channel", "Log", "LogChannel", "Raster", "Reader", "Recording"]
