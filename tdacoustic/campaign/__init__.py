@@ -1,0 +1,28 @@
+"""``campaign.toml`` as checked, frozen models. Reads TOML and CSV, never a log."""
+
+from tdacoustic.campaign.channels import CampaignChannel
+from tdacoustic.campaign.judgements import Exclude, Level, Override
+from tdacoustic.campaign.load import load_campaign
+from tdacoustic.campaign.model import SCHEMA, Campaign
+from tdacoustic.campaign.names import legal_name, name_problem
+from tdacoustic.campaign.runs import CampaignRun
+from tdacoustic.campaign.scale import Scale
+from tdacoustic.campaign.settings import AnalysisSettings, CalibrationSettings
+from tdacoustic.campaign.values import WrittenPath
+
+__all__ = [
+    "SCHEMA",
+    "AnalysisSettings",
+    "CalibrationSettings",
+    "Campaign",
+    "CampaignChannel",
+    "CampaignRun",
+    "Exclude",
+    "Level",
+    "Override",
+    "Scale",
+    "WrittenPath",
+    "legal_name",
+    "load_campaign",
+    "name_problem",
+]

@@ -1,0 +1,106 @@
+"""``[[run]]``: what was driven, and the logs of it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from tdacoustic.campaign.names import Name
+from tdacoustic.campaign.values import NonNegative, Positive, StatedPath, Table, Text
+
+__all__ = ["CampaignRun", "Kind", "Mode", "with_names"]
+
+Kind = Literal["test", "background", "calibration_before", "calibration_after"]
+"""What a run is for."""
+
+Mode = Literal["traction", "brake", "coast", "hauled"]
+"""How the drive was working."""
+
+
+class CampaignRun(Table):
+    """One ``[[run]]``, or one row of ``runs.csv``.
+
+    Parameters
+    ----------
+    name : str
+        Unique. Default: the condition, or ``condition#k`` where several runs lack a
+        name or share the condition; of a run that is no test, its kind after the condition.
+    condition : str or None
+        Runs of one condition are averaged; a test run needs it.
+    kind : str
+        One of `Kind`.
+    mode : str or None
+        One of `Mode`.
+    torque_n_m : float or None
+        Of one motor, signed.
+    direction : str or None
+        Of travel.
+    wheel_diameter_mm : float or None
+        As worn.
+    oil_temperature_degc : float or None
+    train_speed_km_h, motor_speed_rpm : float or None
+        Magnitudes; absent where a speed or tacho channel says it.
+    logs : tuple of WrittenPath
+        At least one.
+    sample_rate_hz : float or None
+        Only where the log does not say.
+    start_s, end_s : float or None
+        Cut, from the run's common start.
+    valid : bool
+    reject_reason : str or None
+        Of a run that is not valid.
+    """
+
+    name: Name = ""
+    condition: Name | None = None
+    kind: Kind = "test"
+    mode: Mode | None = None
+    torque_n_m: float | None = None
+    direction: Text | None = None
+    wheel_diameter_mm: Positive | None = None
+    oil_temperature_degc: Annotated[float, Field(ge=-273.15)] | None = None
+    train_speed_km_h: NonNegative | None = None
+    motor_speed_rpm: NonNegative | None = None
+    logs: Annotated[tuple[StatedPath, ...], Field(min_length=1)]
+    sample_rate_hz: Positive | None = None
+    start_s: float | None = None
+    end_s: float | None = None
+    valid: bool = True
+    reject_reason: Text | None = None
+
+    @model_validator(mode="after")
+    def _hangs_together(self) -> CampaignRun:
+        if self.kind == "test" and self.condition is None:
+            raise ValueError("condition is missing; a run of kind 'test' needs one")
+        start_s = 0.0 if self.start_s is None else self.start_s
+        if self.end_s is not None and not self.end_s > start_s:
+            raise ValueError(f"end_s must be > start_s = {start_s:g}, got {self.end_s:g}")
+        if not self.valid and self.reject_reason is None:
+            raise ValueError("valid = false needs a reject_reason, which is missing")
+        if self.valid and self.reject_reason is not None:
+            raise ValueError(f"reject_reason {self.reject_reason!r} stands beside valid = true; set valid = false")
+        written = [log.text for log in self.logs]
+        for text, count in Counter(str(log.path) for log in self.logs).items():
+            if count > 1:
+                raise ValueError(f"logs names {text!r} {count} times, got {written}")
+        return self
+
+
+def _default_name(run: CampaignRun) -> str:
+    if run.kind == "test":
+        return run.condition or ""
+    return run.kind if run.condition is None else f"{run.condition} {run.kind}"
+
+
+def with_names(runs: Sequence[CampaignRun]) -> tuple[CampaignRun, ...]:
+    """Return the runs with a name each: their own, the condition, or ``condition#k``, k counted over its runs."""
+    bases = [_default_name(run) for run in runs]
+    totals, seen, named = Counter(bases), Counter[str](), []
+    for run, base in zip(runs, bases, strict=True):
+        seen[base] += 1
+        default = base if totals[base] == 1 else f"{base}#{seen[base]}"
+        named.append(run if run.name else run.model_copy(update={"name": default}))
+    return tuple(named)
