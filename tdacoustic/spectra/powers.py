@@ -1,0 +1,117 @@
+"""Block powers: one pass over the samples, kept so that later steps need no second reading."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from tdacoustic.spectra.frames import FramePlan
+
+__all__ = ["FramePowerMeter", "SegmentPowers", "hann"]
+
+Array = NDArray[np.float64]
+
+
+def hann(length: int) -> Array:
+    """Periodic Hann window, shape (length,)."""
+    return 0.5 - 0.5 * np.cos(2.0 * np.pi * np.arange(length) / length)
+
+
+@dataclass(frozen=True)
+class SegmentPowers:
+    """Mean-square densities of the segments of a record.
+
+    Parameters
+    ----------
+    plan : FramePlan
+    density : ndarray of float32, shape (n_channels, n_segments, n_frequencies)
+        One-sided mean-square density, unit² / Hz, the mean over the segment's
+        frames; Hann window, the mean of each frame removed.
+    frames : ndarray of int, shape (n_channels, n_segments)
+        Frames averaged; fewer where frames held samples that were no numbers.
+    means : ndarray, shape (n_channels, n_segments)
+        Mean of the frames' means.
+    """
+
+    plan: FramePlan
+    density: NDArray[np.float32]
+    frames: NDArray[np.int64]
+    means: Array
+
+    @property
+    def segment_times_s(self) -> Array:
+        """Middle of each segment after the record's start, shape (n_segments,)."""
+        plan = self.plan
+        frame = np.arange(plan.n_frames)
+        segment = frame * plan.n_segments // plan.n_frames
+        middle = (frame * plan.hop + 0.5 * plan.frame_length) / plan.sample_rate_hz
+        return np.bincount(segment, weights=middle) / np.bincount(segment)
+
+
+class FramePowerMeter:
+    """Takes blocks of samples and gathers the powers of overlapping frames.
+
+    The window is Hann; the mean of each frame is removed, which for a periodic
+    Hann window changes lines 0 and 1 alone and is done there.
+
+    Parameters
+    ----------
+    plan : FramePlan
+    n_channels : int
+    """
+
+    def __init__(self, plan: FramePlan, n_channels: int) -> None:
+        self.plan = plan
+        shape = (n_channels, plan.n_segments, plan.n_frequencies)
+        self._density = np.zeros(shape)
+        self._frames = np.zeros(shape[:2], dtype=np.int64)
+        self._means = np.zeros(shape[:2])
+        self._window = hann(plan.frame_length)
+        self._scratch = np.empty(plan.frame_length)
+        self._pending = np.empty((n_channels, 0))
+        self._next_frame = 0
+
+    def take(self, block: Array) -> None:
+        """Add samples, shape (n_channels, n), in order."""
+        plan = self.plan
+        data = np.concatenate((self._pending, block), axis=1) if self._pending.shape[1] else block
+        start = 0
+        while self._next_frame < plan.n_frames and start + plan.frame_length <= data.shape[1]:
+            self._take_frame(data[:, start : start + plan.frame_length])
+            start += plan.hop
+        self._pending = data[:, start:].copy() if self._next_frame < plan.n_frames else data[:, :0].copy()
+
+    def _take_frame(self, frames: Array) -> None:
+        segment = self.plan.segment_of(self._next_frame)
+        half = 0.5 * self.plan.frame_length
+        for channel, frame in enumerate(frames):
+            mean = float(frame.mean())
+            if not np.isfinite(mean):
+                continue
+            np.multiply(frame, self._window, out=self._scratch)
+            transform = scipy.fft.rfft(self._scratch, overwrite_x=True)
+            transform[0] -= half * mean
+            transform[1] += 0.5 * half * mean
+            squares = transform.view(np.float64)
+            np.multiply(squares, squares, out=squares)
+            self._density[channel, segment] += squares[0::2]
+            self._density[channel, segment] += squares[1::2]
+            self._frames[channel, segment] += 1
+            self._means[channel, segment] += mean
+        self._next_frame += 1
+
+    def result(self) -> SegmentPowers:
+        """Return the powers of all frames taken so far."""
+        plan = self.plan
+        one_sided = np.full(plan.n_frequencies, 2.0)
+        one_sided[0] = 1.0
+        if plan.frame_length % 2 == 0:
+            one_sided[-1] = 1.0
+        scale = one_sided / (plan.sample_rate_hz * float(np.sum(self._window**2)))
+        with np.errstate(invalid="ignore", divide="ignore"):
+            density = self._density * scale / self._frames[:, :, np.newaxis]
+            means = self._means / self._frames
+        return SegmentPowers(plan, density.astype(np.float32), self._frames.copy(), means)
