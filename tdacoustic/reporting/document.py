@@ -1,0 +1,326 @@
+"""What a report says, independent of how a page shows it.
+
+A `Document` is made of sections, a section of blocks: paragraphs, lists, facts, tables,
+figures, notices. All text is plain text; the page escapes it. Where a number comes from is
+said by its `Origin`, which the page shows as a tag with words, never by colour alone.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Final, Literal, TypeAlias, get_args
+
+from tdacoustic.reporting.figure import Figure, ReportError, check_slug
+
+__all__ = [
+    "ORIGINS",
+    "Block",
+    "Cell",
+    "Column",
+    "Details",
+    "Document",
+    "Fact",
+    "Facts",
+    "FigureBlock",
+    "Notice",
+    "Origin",
+    "Paragraph",
+    "Section",
+    "Sentences",
+    "Table",
+    "walk",
+]
+
+Origin = Literal["measured", "synthetic", "printed", "assumed", "calculated"]
+ORIGINS: Final[tuple[str, ...]] = get_args(Origin)
+NoticeKind = Literal["info", "warning", "bad", "synthetic", "assumed"]
+ColumnKind = Literal["number", "text", "origin", "verdict"]
+Cell: TypeAlias = str | float | int | bool | None
+
+
+def _check_origin(origin: str | None, what: str) -> None:
+    if origin is not None and origin not in ORIGINS:
+        raise ReportError(f"origin of {what} must be one of {', '.join(ORIGINS)}, got {origin!r}")
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """A paragraph of plain text."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Sentences:
+    """A list of sentences, one a bullet."""
+
+    items: Sequence[str]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "items", tuple(self.items))
+
+
+@dataclass(frozen=True)
+class Notice:
+    """Something the reader must not miss.
+
+    Parameters
+    ----------
+    kind : {"info", "warning", "bad", "synthetic", "assumed"}
+        Says in one word, which the page prints, what sort of notice it is.
+    text : str
+        One or two sentences.
+    """
+
+    kind: NoticeKind
+    text: str
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(NoticeKind):
+            raise ReportError(f"kind of a notice must be one of {get_args(NoticeKind)}, got {self.kind!r}")
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A key and its value in words, with the origin of the value where it matters."""
+
+    key: str
+    value: str
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        _check_origin(self.origin, f"fact {self.key!r}")
+
+
+@dataclass(frozen=True)
+class Facts:
+    """Keys and values.
+
+    Parameters
+    ----------
+    pairs : sequence of Fact, (key, value) or (key, value, origin)
+        In the order in which they are shown.
+    """
+
+    pairs: Sequence[Fact | tuple[str, str] | tuple[str, str, Origin | None]]
+
+    def __post_init__(self) -> None:
+        facts = tuple(pair if isinstance(pair, Fact) else Fact(*pair) for pair in self.pairs)
+        object.__setattr__(self, "pairs", facts)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of a table.
+
+    Parameters
+    ----------
+    key : str
+        Its header in the downloaded CSV, ``"level_db"``.
+    title : str
+        Its header in the page, ``"Level"``.
+    unit : str
+        Shown below the title, ``"dB re 20 uPa"``.
+    digits : int, optional
+        Decimals of its numbers; default: six significant digits.
+    kind : {"number", "text", "origin", "verdict"}
+        ``"origin"`` cells are one of `ORIGINS`, ``"verdict"`` cells are ``ok``, ``warning``,
+        ``bad`` or another word; both are shown as tags.
+    align : {"left", "right", "center"}, optional
+        Default: numbers to the right, all else to the left.
+    """
+
+    key: str
+    title: str
+    unit: str = ""
+    digits: int | None = None
+    kind: ColumnKind = "text"
+    align: Literal["left", "right", "center"] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in get_args(ColumnKind):
+            raise ReportError(f"kind of column {self.key!r} must be one of {get_args(ColumnKind)}, got {self.kind!r}")
+        if self.digits is not None and not 0 <= self.digits <= 12:
+            raise ReportError(f"digits of column {self.key!r} must be 0 to 12, got {self.digits}")
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table that can be sorted and downloaded.
+
+    Parameters
+    ----------
+    name : str
+        Unique in a document; anchor of the table.
+    caption : str
+        Shown above it.
+    columns : sequence of Column
+        At least one, with different keys.
+    rows : sequence of sequences
+        One cell a column: text, number, bool, or None (also NaN) for not determined.
+    csv : str, optional
+        Name of the download; default ``<name>.csv``.
+    origin : str, optional
+        Of the numbers in it.
+
+    Raises
+    ------
+    ReportError
+        A row has not as many cells as there are columns, or a number column holds text.
+    """
+
+    name: str
+    caption: str
+    columns: Sequence[Column]
+    rows: Sequence[Sequence[Cell]]
+    csv: str | None = None
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        check_slug(self.name, "name of a table")
+        _check_origin(self.origin, f"table {self.name!r}")
+        columns = tuple(self.columns)
+        rows = tuple(tuple(_plain(cell) for cell in row) for row in self.rows)
+        if not columns or len({column.key for column in columns}) < len(columns):
+            raise ReportError(f"table {self.name!r} needs columns with different keys")
+        for number, row in enumerate(rows):
+            if len(row) != len(columns):
+                raise ReportError(f"row {number} of table {self.name!r} has {len(row)} cells, expected {len(columns)}")
+            for column, cell in zip(columns, row, strict=True):
+                if column.kind == "number" and isinstance(cell, str):
+                    raise ReportError(f"column {column.key!r} of table {self.name!r} is of numbers, got {cell!r}")
+                if column.kind == "origin" and cell is not None:
+                    _check_origin(str(cell), f"row {number} of table {self.name!r}")
+        object.__setattr__(self, "columns", columns)
+        object.__setattr__(self, "rows", rows)
+
+    @property
+    def csv_name(self) -> str:
+        """Name of the downloaded file."""
+        return self.csv or f"{self.name}.csv"
+
+
+def _plain(cell: object) -> Cell:
+    """Turn a numpy scalar into Python's own; NaN and infinity become None."""
+    value = cell.item() if hasattr(cell, "item") else cell
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    raise ReportError(f"a cell is text, a number, a bool or None, got {value!r}")
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A figure in its place, with the origin of what it shows."""
+
+    figure: Figure
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        _check_origin(self.origin, f"figure {self.figure.name!r}")
+
+
+@dataclass(frozen=True)
+class Details:
+    """Blocks that are folded away below one line until the reader opens them; printed open."""
+
+    summary: str
+    blocks: Sequence[Block]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "blocks", tuple(self.blocks))
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section with a heading; sections among its blocks are its subsections.
+
+    Parameters
+    ----------
+    id : str
+        Unique in a document; its anchor.
+    title : str
+        Its heading, which the page numbers.
+    blocks : sequence of blocks or Section
+        What it says, in order.
+    """
+
+    id: str
+    title: str
+    blocks: Sequence[Block]
+
+    def __post_init__(self) -> None:
+        check_slug(self.id, "id of a section")
+        object.__setattr__(self, "blocks", tuple(self.blocks))
+
+
+Block: TypeAlias = Paragraph | Sentences | Notice | Facts | Table | FigureBlock | Details | Section
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report.
+
+    Parameters
+    ----------
+    title, subtitle : str
+        Head of the page.
+    origin : {"measured", "synthetic", "printed", "assumed", "calculated"}
+        Of the data that the report is about; shown beside the title.
+    summary : sequence of blocks
+        What the reader needs if they read nothing else.
+    notices : sequence of Notice
+        Shown above the summary.
+    sections : sequence of Section
+        The body, numbered by the page.
+    facts : sequence of facts
+        Shown below the title: date, vehicle, program and its version.
+    footer : sequence of str
+        Lines at the end.
+
+    Raises
+    ------
+    ReportError
+        Two sections, tables or figures share a name.
+    """
+
+    title: str
+    subtitle: str
+    origin: Origin
+    summary: Sequence[Block] = ()
+    notices: Sequence[Notice] = ()
+    sections: Sequence[Section] = ()
+    facts: Sequence[Fact | tuple[str, str] | tuple[str, str, Origin | None]] = ()
+    footer: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        _check_origin(self.origin, "a document")
+        object.__setattr__(self, "facts", Facts(self.facts).pairs)
+        for key in ("summary", "notices", "sections", "footer"):
+            value = getattr(self, key)
+            if isinstance(value, str):
+                raise ReportError(f"{key} of a document must be a sequence, got text")
+            object.__setattr__(self, key, tuple(value))
+        names: dict[str, list[str]] = {"section": ["summary"], "table": [], "figure": []}
+        for block in walk((*self.summary, *self.sections)):
+            if isinstance(block, Section):
+                names["section"].append(block.id)
+            elif isinstance(block, Table):
+                names["table"].append(block.name)
+            elif isinstance(block, FigureBlock):
+                names["figure"].append(block.figure.name)
+        for what, found in names.items():
+            twice = sorted({name for name in found if found.count(name) > 1})
+            if twice:
+                raise ReportError(f"two of the document's {what}s are named {', '.join(twice)}")
+
+
+def walk(blocks: Sequence[Block]) -> Iterator[Block]:
+    """Yield every block in reading order, those inside of sections and details too."""
+    for block in blocks:
+        yield block
+        if isinstance(block, Section | Details):
+            yield from walk(block.blocks)

@@ -1,0 +1,325 @@
+"""Turn a `Document` into one self-contained HTML page.
+
+The page asks the network for nothing: its policy forbids it, and only the two scripts whose
+hashes it names may run. Plotly's script is embedded once, compressed; where a browser cannot
+inflate it, or runs no scripts, and on paper, each figure is its static picture.
+
+The same document gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import hashlib
+import json
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from typing import Any, Final
+
+from jinja2 import Environment, StrictUndefined
+from markupsafe import Markup
+
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    Document,
+    Facts,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+    walk,
+)
+from tdacoustic.reporting.figure import Heatmap
+from tdacoustic.reporting.matplotlib_renderer import render_png
+from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
+from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
+
+__all__ = ["MAX_FIGURE_BYTES", "MAX_INTERACTIVE", "csv_cell", "render_html", "safe_json"]
+
+MAX_INTERACTIVE: Final = 60
+"""Figures of a page that can be zoomed; later ones are still pictures."""
+MAX_FIGURE_BYTES: Final = 12_000_000
+"""Data of all figures of a page that can be zoomed."""
+STATIC_DPI: Final = 150
+
+_WORDS: Final = {"info": "Note", "warning": "Warning", "bad": "Problem", "synthetic": "Synthetic", "assumed": "Assumed"}
+_ORIGIN_WORDS: Final = {
+    "measured": "The data of this report were measured.",
+    "synthetic": "The data of this report were made by a program. They are not measurements.",
+    "printed": "The data of this report were taken from a publication.",
+    "assumed": "The data of this report are assumptions.",
+    "calculated": "The data of this report were calculated by a model. They are not measurements.",
+}
+
+
+def safe_json(value: object) -> str:
+    r"""Write JSON that stays inert inside of a ``<script>`` element; NaN is refused.
+
+    Examples
+    --------
+    >>> safe_json("</script>")
+    '"\\u003c/script\\u003e"'
+    """
+    text = json.dumps(value, separators=(",", ":"), allow_nan=False)
+    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def csv_cell(text: str) -> str:
+    """Make a text harmless that a spreadsheet would take for a formula; numbers stay numbers.
+
+    Examples
+    --------
+    >>> csv_cell("=cmd()"), csv_cell("-3.2"), csv_cell("mic_1")
+    ("'=cmd()", '-3.2', 'mic_1')
+    """
+    if not text.startswith(("=", "+", "-", "@", "\t", "\r", "\n")):
+        return text
+    try:
+        float(text)
+    except ValueError:
+        return "'" + text
+    return text
+
+
+@cache
+def _template(name: str) -> str:
+    source = (files("tdacoustic.reporting") / "templates" / name).read_text(encoding="utf-8")
+    return source.replace("\r\n", "\n")
+
+
+@cache
+def _plotly_script() -> tuple[str, str]:
+    """Plotly's script, gzipped and in base64, and the hash the page's policy names it by."""
+    source = (files("plotly") / "package_data" / "plotly.min.js").read_bytes()
+    return base64.b64encode(gzip.compress(source, 9, mtime=0)).decode("ascii"), _script_hash(source)
+
+
+def _script_hash(source: bytes) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(source).digest()).decode('ascii')}'"
+
+
+def _policy(script_hashes: Sequence[str]) -> str:
+    return (
+        f"default-src 'none'; script-src {' '.join(script_hashes)}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _number(value: float, digits: int | None) -> str:
+    """Write a number for reading, with a true minus sign."""
+    text = f"{value:.{digits}f}" if digits is not None else f"{value:.6g}"
+    if text.startswith("-") and not text.strip("-0."):
+        text = text[1:]
+    return text.replace("-", "\u2212")
+
+
+def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
+    """What a cell shows, and what it sorts and downloads as (``raw``; None: the same)."""
+    align = column.align or ("right" if column.kind == "number" else "left")
+    tag = 'th scope="row"' if first and column.kind == "text" else "td"
+    view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None}
+    if cell is None:
+        return view | {"text": "\u2013" if column.kind == "number" else "", "raw": ""}
+    if isinstance(cell, bool):
+        return view | {"text": "yes" if cell else "no", "raw": "true" if cell else "false"}
+    if not isinstance(cell, str):
+        text, raw = _number(cell, column.digits), f"{cell:.9g}"
+        return view | {"text": text, "raw": None if raw == text else raw}
+    raw = csv_cell(cell)
+    if column.kind in ("origin", "verdict") and cell:
+        known = column.kind == "origin" or cell in ("ok", "warning", "bad")
+        view["chip"] = f"{column.kind}-{cell}" if known else "verdict-other"
+    return view | {"text": cell, "raw": None if raw == cell.strip() else raw}
+
+
+def _table(table: Table) -> dict[str, Any]:
+    columns = [
+        {
+            "key": column.key,
+            "title": column.title,
+            "unit": column.unit,
+            "kind": column.kind,
+            "align": column.align or ("right" if column.kind == "number" else "left"),
+        }
+        for column in table.columns
+    ]
+    rows = [
+        [_cell(column, cell, index == 0) for index, (column, cell) in enumerate(zip(table.columns, row, strict=True))]
+        for row in table.rows
+    ]
+    return {
+        "type": "table",
+        "name": table.name,
+        "caption": table.caption,
+        "columns": columns,
+        "rows": rows,
+        "file": table.csv_name,
+        "origin": table.origin,
+    }
+
+
+def _png_size(png: bytes) -> tuple[int, int]:
+    width, height = struct.unpack(">II", png[16:24])
+    return int(width), int(height)
+
+
+@dataclass
+class _Views:
+    """Blocks as the template reads them; counts figures and tables, and what the figures weigh."""
+
+    max_interactive: int
+    max_figure_bytes: int
+    figures: int = 0
+    tables: int = 0
+    interactive: int = 0
+    figure_bytes: int = 0
+    full: bool = False
+    sections: list[dict[str, Any]] = field(default_factory=list)
+
+    def figure(self, block: FigureBlock) -> dict[str, Any]:
+        figure = block.figure
+        self.figures += 1
+        heat = any(isinstance(element, Heatmap) for element in figure.elements)
+        png = render_png(figure, STATIC_DPI, colours=96 if heat else 48)
+        width, height = _png_size(png)
+        return {
+            "type": "figure",
+            "number": self.figures,
+            "name": figure.name,
+            "title": figure.title.rstrip("."),
+            "caption": figure.caption,
+            "alt": f"{figure.title}: {figure.y_axis.caption} over {figure.x_axis.caption}",
+            "origin": block.origin,
+            "png": Markup(base64.b64encode(png).decode("ascii")),
+            "width": width,
+            "height": height,
+            "reduced": is_reduced(figure),
+            "json": self.payload(block),
+        }
+
+    def payload(self, block: FigureBlock) -> Markup | None:
+        """The figure's data for the page's script, or None once the page is full."""
+        if self.full or self.interactive >= self.max_interactive:
+            self.full = True
+            return None
+        text = safe_json(render_plotly(block.figure, scheme="css"))
+        if self.figure_bytes + len(text) > self.max_figure_bytes:
+            self.full = True
+            return None
+        self.interactive += 1
+        self.figure_bytes += len(text)
+        return Markup(text)
+
+    def block(self, block: Block, level: int, number: str) -> dict[str, Any]:
+        if isinstance(block, Paragraph):
+            return {"type": "paragraph", "text": block.text}
+        if isinstance(block, Sentences):
+            return {"type": "sentences", "items": block.items}
+        if isinstance(block, Notice):
+            return {"type": "notice", "kind": block.kind, "text": block.text}
+        if isinstance(block, Facts):
+            return {"type": "facts", "pairs": block.pairs}
+        if isinstance(block, FigureBlock):
+            return self.figure(block)
+        if isinstance(block, Table):
+            self.tables += 1
+            return _table(block) | {"number": self.tables}
+        if isinstance(block, Details):
+            return {"type": "details", "summary": block.summary, "blocks": self.blocks(block.blocks, level, number)}
+        return self.section(block, level, number)
+
+    def blocks(self, blocks: Sequence[Block], level: int, number: str) -> list[dict[str, Any]]:
+        views, below = [], 0
+        for block in blocks:
+            below += isinstance(block, Section)
+            views.append(self.block(block, level + 1, f"{number}.{below}" if number else ""))
+        return views
+
+    def section(self, section: Section, level: int, number: str) -> dict[str, Any]:
+        blocks = self.blocks(section.blocks, level, number)
+        return {
+            "type": "section",
+            "id": section.id,
+            "title": section.title,
+            "number": number,
+            "level": min(level, 4),
+            "blocks": blocks,
+            "subsections": [view for view in blocks if view["type"] == "section"] if level == 2 else [],
+        }
+
+
+def _sections(document: Document, views: _Views) -> list[dict[str, Any]]:
+    sections = []
+    if document.summary:
+        sections.append(views.section(Section("summary", "Summary", document.summary), 2, ""))
+    sections += [views.section(section, 2, str(n)) for n, section in enumerate(document.sections, start=1)]
+    return sections
+
+
+def render_html(
+    document: Document, max_interactive: int = MAX_INTERACTIVE, max_figure_bytes: int = MAX_FIGURE_BYTES
+) -> str:
+    """Write a document as one HTML page that needs nothing else.
+
+    Parameters
+    ----------
+    document : Document
+        What it says.
+    max_interactive, max_figure_bytes : int
+        How many figures, and how many bytes of their data, can be zoomed; the figures after
+        that are still pictures, and the page says so.
+
+    Returns
+    -------
+    str
+        HTML, to be written in UTF-8 without translation of line ends.
+
+    Examples
+    --------
+    >>> from tdacoustic.reporting.document import Document, Paragraph, Section
+    >>> page = render_html(Document("Report", "", "measured", sections=[Section("one", "One", [Paragraph("a < b")])]))
+    >>> "a &lt; b" in page
+    True
+    """
+    views = _Views(max_interactive, max_figure_bytes)
+    sections = _sections(document, views)
+    if views.full:
+        still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
+        text = f"Of the {still} figures of this page the first {views.interactive} can be zoomed; "
+        text += "the others are still pictures, which keeps the page small."
+        document_notices = (*document.notices, Notice("info", text))
+    else:
+        document_notices = tuple(document.notices)
+    packed, plotly_hash = _plotly_script() if views.interactive else ("", "")
+    script = _template("page.js")
+    hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]
+    dark = f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {css_variables('dark')} }} }}\n"
+    environment = Environment(autoescape=True, undefined=StrictUndefined)
+    page = environment.from_string(_template("page.html.j2"))
+    return page.render(
+        document={
+            "title": document.title,
+            "subtitle": document.subtitle,
+            "origin": document.origin,
+            "facts": document.facts,
+            "notices": document_notices,
+            "footer": document.footer,
+        },
+        origin_words=_ORIGIN_WORDS[document.origin],
+        sections=sections,
+        words=_WORDS,
+        policy=Markup(_policy(hashes)),
+        css=Markup(f":root {{ {css_variables('light')} }}\n{dark}{_template('page.css')}"),
+        js=Markup(script),
+        palette=Markup(safe_json({"light": dict(LIGHT), "dark": dict(DARK)})),
+        plotly=Markup(packed),
+    )

@@ -1,0 +1,309 @@
+"use strict";
+(() => {
+  const all = (selector, root = document) => [...root.querySelectorAll(selector)];
+
+  /* ---- tables: sorting and download ---- */
+  const value = (cell) => (cell.dataset.v !== undefined ? cell.dataset.v : cell.textContent.trim());
+  const collator = new Intl.Collator("en", { numeric: true });
+
+  const sortBy = (table, column, direction) => {
+    const body = table.tBodies[0];
+    const head = table.tHead.rows[0].cells[column];
+    const numeric = head.dataset.kind === "number";
+    const key = (row) => {
+      const text = value(row.cells[column]);
+      return numeric ? (text === "" ? null : Number(text)) : text || null;
+    };
+    const rows = [...table.rowsAtFirst];
+    if (direction !== "none") {
+      const sign = direction === "ascending" ? 1 : -1;
+      rows.sort((a, b) => {
+        const p = key(a), q = key(b);
+        if (p === null || q === null) return (p === null) - (q === null);
+        return sign * (numeric ? p - q : collator.compare(p, q));
+      });
+    }
+    for (const cell of table.tHead.rows[0].cells) cell.removeAttribute("aria-sort");
+    if (direction !== "none") head.setAttribute("aria-sort", direction);
+    body.append(...rows);
+  };
+
+  const quoted = (text) => (/[",\n\r]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const save = (blob, name) => {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = name;
+    document.body.append(link);
+    link.click();
+    link.remove();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  };
+
+  for (const figure of all("figure.table")) {
+    const table = figure.querySelector("table");
+    table.rowsAtFirst = [...table.tBodies[0].rows];
+    all("thead th", table).forEach((head, column) => {
+      const button = document.createElement("button");
+      button.type = "button";
+      button.className = "head";
+      const words = head.querySelector(".words");
+      button.textContent = words.textContent;
+      button.title = "Sort by this column";
+      words.classList.add("on-paper");
+      words.before(button);
+      button.addEventListener("click", () => {
+        const next = { ascending: "descending", descending: "none" }[head.getAttribute("aria-sort")] || "ascending";
+        sortBy(table, column, next);
+      });
+    });
+    const download = figure.querySelector(".csv");
+    download.hidden = false;
+    download.addEventListener("click", () => {
+      const lines = [all("thead th", table).map((cell) => cell.dataset.key)];
+      for (const row of table.tBodies[0].rows) lines.push([...row.cells].map(value));
+      const text = lines.map((line) => line.map(quoted).join(",") + "\n").join("");
+      save(new Blob([text], { type: "text/csv;charset=utf-8" }), download.dataset.file);
+    });
+  }
+
+  /* ---- contents: where the reader is ---- */
+  const links = new Map(all("nav.side a").map((link) => [link.getAttribute("href").slice(1), link]));
+  if (links.size && "IntersectionObserver" in window) {
+    const sections = all("main section[id]").filter((section) => links.has(section.id));
+    const mark = () => {
+      let here = sections[0];
+      for (const section of sections) if (section.getBoundingClientRect().top < 140) here = section;
+      links.forEach((link, id) => link.classList.toggle("here", here && id === here.id));
+    };
+    let waiting = false;
+    addEventListener("scroll", () => {
+      if (waiting) return;
+      waiting = true;
+      requestAnimationFrame(() => { waiting = false; mark(); });
+    }, { passive: true });
+    mark();
+  }
+
+  /* ---- print: everything open ---- */
+  let opened = [];
+  addEventListener("beforeprint", () => {
+    opened = all("details:not([open]):not(.narrow)");
+    opened.forEach((details) => { details.open = true; });
+  });
+  addEventListener("afterprint", () => opened.forEach((details) => { details.open = false; }));
+
+  /* ---- figures ---- */
+  const packed = document.getElementById("plotly");
+  if (!packed || !("DecompressionStream" in window) || !("IntersectionObserver" in window)) return;
+  const palette = JSON.parse(document.getElementById("palette").textContent);
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  const touch = matchMedia("(pointer: coarse)");
+
+  let library = null;
+  const plotly = () => {
+    library = library || (async () => {
+      const bytes = Uint8Array.from(atob(packed.textContent.trim()), (c) => c.charCodeAt(0));
+      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+      const script = document.createElement("script");
+      script.textContent = await new Response(stream).text();
+      document.head.append(script);
+      packed.remove();
+      if (!window.Plotly) throw new Error("plotly did not start");
+      return window.Plotly;
+    })();
+    return library;
+  };
+
+  const coloured = (node, colours) => {
+    if (typeof node === "string") return node.startsWith("var(--") ? colours[node.slice(6, -1)] : node;
+    if (Array.isArray(node)) return typeof node[0] === "number" ? node : node.map((one) => coloured(one, colours));
+    if (node && typeof node === "object") {
+      return Object.fromEntries(Object.entries(node).map(([key, one]) => [key, coloured(one, colours)]));
+    }
+    return node;
+  };
+  const painted = (figure, scheme) => coloured(figure.json, palette[scheme]);
+
+  /* The same greedy placement as layout.py, for the size and the range shown. */
+  const measure = document.createElement("canvas").getContext("2d");
+  measure.font = `11px ${getComputedStyle(document.body).fontFamily}`;
+  const decoder = document.createElement("textarea");
+  const plain = (text) => { decoder.innerHTML = text; return decoder.value; };
+
+  const annotations = (labels, x, y, colours) => {
+    const width = x._length, height = y._length, line = 15, boxes = [], placed = [];
+    const at = (one) => [
+      ((one.x - x.range[0]) / (x.range[1] - x.range[0])) * width,
+      one.y === null ? 0 : ((y.range[1] - one.y) / (y.range[1] - y.range[0])) * height,
+    ];
+    const shown = labels.map((one) => ({ one, at: at(one) }))
+      .filter(({ at: [px, py] }) => px >= -1 && px <= width + 1 && py >= -1 && py <= height + 1);
+    const rank = ({ one, at: [px, py] }) => (one.y === null ? [0, px] : [1, py]);
+    shown.sort((a, b) => rank(a)[0] - rank(b)[0] || rank(a)[1] - rank(b)[1]);
+    const points = shown.filter(({ one }) => one.y !== null);
+    const free = (box, own) => boxes.every((b) => box[2] <= b[0] || box[0] >= b[2] || box[3] <= b[1] || box[1] >= b[3])
+      && points.every(({ one, at: [px, py] }) => one === own
+        || px <= box[0] - 3 || px >= box[2] + 3 || py <= box[1] - 3 || py >= box[3] + 3);
+    for (const { one, at: [px, py] } of shown) {
+      const rule = one.y === null, size = measure.measureText(plain(one.text)).width + 8;
+      const over = rule
+        ? (px + 3 + size <= width ? px + 3 + size / 2 : px - 3 - size / 2)
+        : Math.min(Math.max(px, size / 2), width - size / 2);
+      const places = [0, 1, 2, 3, 4].map((level) => [over, rule ? 3 + line * (level + 0.5) : py - line * (level + 0.95)]);
+      if (!rule) places.push([px + size / 2 + 7.5, py], [px - size / 2 - 7.5, py]);
+      for (const [level, [centre, middle]] of places.entries()) {
+        const box = [centre - size / 2, middle - line / 2, centre + size / 2, middle + line / 2];
+        if (box[1] < 0 || box[0] < -1 || box[2] > width + 1 || !free(box, one)) continue;
+        boxes.push(box);
+        const common = { x: one.x, text: one.text, font: { size: 11, color: coloured(one.color, colours) }, bgcolor: colours.label };
+        placed.push(rule
+          ? { ...common, yref: "paper", y: 1, yanchor: "middle", showarrow: false, xshift: centre - px, yshift: -middle }
+          : {
+            ...common, y: one.y, showarrow: true, ax: centre - px, ay: middle - py, arrowhead: 0, arrowwidth: 0.8,
+            arrowcolor: level > 0 && level < 5 ? coloured(one.color, colours) : "rgba(0,0,0,0)", standoff: 5, borderpad: 1,
+          });
+        break;
+      }
+    }
+    return placed;
+  };
+
+  const tickText = (v) => {
+    if (v >= 1e6 || v < 1e-4) return v.toExponential(0).replace("e+", "e");
+    return v >= 1e4 ? v.toFixed(0).replace(/\B(?=(\d{3})+$)/g, "\u202f") : String(Number(v.toPrecision(6)));
+  };
+  const ticks = (axis) => {
+    if (axis.type !== "log") return {};
+    const [low, high] = axis.range, values = [];
+    const digits = high - low <= 4 ? [1, 2, 5] : [1];
+    for (let power = Math.floor(low); power <= Math.ceil(high); power += 1) {
+      for (const digit of digits) {
+        const at = power + Math.log10(digit);
+        if (at >= low - 1e-6 && at <= high + 1e-6) values.push(Number(`${digit}e${power}`));
+      }
+    }
+    if (values.length < 3) return { tickmode: "auto", tickvals: null, ticktext: null };
+    const room = axis._id === "x" ? 42 : 18;
+    const thin = values.length * room > axis._length && digits.length > 1;
+    const kept = thin ? values.filter((v) => /^1e/.test(v.toExponential())) : values;
+    return kept.length < 2
+      ? { tickmode: "auto", tickvals: null, ticktext: null }
+      : { tickmode: "array", tickvals: kept, ticktext: kept.map(tickText) };
+  };
+
+  const settle = async (figure) => {
+    const Plotly = await plotly(), full = figure.live._fullLayout, change = {};
+    const colours = palette[dark.matches ? "dark" : "light"];
+    const labels = (figure.json.layout.meta || {}).labels || [];
+    if (labels.length) change.annotations = annotations(labels, full.xaxis, full.yaxis, colours);
+    for (const name of ["xaxis", "yaxis"]) {
+      for (const [key, one] of Object.entries(ticks(full[name]))) change[`${name}.${key}`] = one;
+    }
+    if (!Object.keys(change).length) return;
+    figure.busy = true;
+    await Plotly.relayout(figure.live, change);
+    figure.busy = false;
+  };
+
+  const layoutFor = (figure, scheme) => {
+    const { data, layout } = painted(figure, scheme);
+    if (touch.matches) layout.dragmode = false;
+    if (figure.live._fullLayout) {
+      for (const name of ["xaxis", "yaxis"]) layout[name].range = [...figure.live._fullLayout[name].range];
+    }
+    return { data, layout };
+  };
+
+  const config = { displayModeBar: false, displaylogo: false, doubleClick: "reset", showTips: false, responsive: false };
+
+  const draw = async (figure) => {
+    const Plotly = await plotly();
+    figure.live = document.createElement("div");
+    figure.live.className = "live-plot";
+    figure.live.setAttribute("aria-hidden", "true");
+    figure.plot.append(figure.live);
+    figure.node.classList.add("live");
+    const { data, layout } = layoutFor(figure, dark.matches ? "dark" : "light");
+    await Plotly.newPlot(figure.live, data, layout, config);
+    await settle(figure);
+    figure.live.on("plotly_relayout", () => { if (!figure.busy) settle(figure); });
+    let width = figure.live.clientWidth, timer = 0;
+    new ResizeObserver(() => {
+      if (!figure.live.clientWidth || Math.abs(figure.live.clientWidth - width) < 2) return;
+      width = figure.live.clientWidth;
+      clearTimeout(timer);
+      timer = setTimeout(async () => {
+        figure.busy = true;
+        await Plotly.relayout(figure.live, { width });
+        figure.busy = false;
+        settle(figure);
+      }, 120);
+    }).observe(figure.plot);
+  };
+
+  const picture = async (figure) => {
+    const Plotly = await plotly(), full = figure.live._fullLayout;
+    const { data, layout } = layoutFor(figure, "light");
+    const labels = (layout.meta || {}).labels || [];
+    layout.annotations = annotations(labels, full.xaxis, full.yaxis, palette.light);
+    for (const name of ["xaxis", "yaxis"]) Object.assign(layout[name], ticks(full[name]));
+    const origin = figure.node.dataset.origin ? ` (${figure.node.dataset.origin})` : "";
+    const title = (figure.node.dataset.title + origin).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+    layout.title = { text: title, x: 0.01, xanchor: "left", y: 1, yanchor: "top", yref: "container", pad: { t: 12 }, font: { size: 15 } };
+    layout.margin = { ...layout.margin, t: layout.margin.t + 34 };
+    const size = { width: figure.live.clientWidth, height: layout.height + 34 };
+    layout.height = size.height;
+    layout.width = size.width;
+    await Plotly.downloadImage({ data, layout, config }, { format: "png", filename: figure.node.dataset.name, scale: 3, ...size });
+  };
+
+  const figures = new Map();
+  for (const node of all("figure.figure")) {
+    const json = node.querySelector('script[type="application/json"]');
+    if (!json) continue;
+    const figure = { node, plot: node.querySelector(".plot"), live: null, busy: false };
+    Object.defineProperty(figure, "json", {
+      configurable: true,
+      get() {
+        const parsed = JSON.parse(json.textContent);
+        Object.defineProperty(figure, "json", { value: parsed });
+        return parsed;
+      },
+    });
+    const tools = node.querySelector(".tools");
+    tools.hidden = false;
+    tools.querySelector(".reset").addEventListener("click", async () => {
+      const { xaxis, yaxis } = figure.json.layout;
+      (await plotly()).relayout(figure.live, { "xaxis.range": [...xaxis.range], "yaxis.range": [...yaxis.range] });
+    });
+    tools.querySelector(".png").addEventListener("click", () => picture(figure));
+    figures.set(node, figure);
+  }
+
+  const fallBack = (error) => {
+    console.error(error);
+    figures.forEach(({ node, live }) => { node.classList.remove("live"); if (live) live.remove(); });
+    all(".figure .tools").forEach((tools) => { tools.hidden = true; });
+  };
+
+  const watcher = new IntersectionObserver((entries) => {
+    for (const { isIntersecting, target } of entries) {
+      if (!isIntersecting) continue;
+      watcher.unobserve(target);
+      draw(figures.get(target)).catch(fallBack);
+    }
+  }, { rootMargin: "500px 0px" });
+  figures.forEach((_, node) => watcher.observe(node));
+
+  dark.addEventListener("change", async () => {
+    const Plotly = await plotly();
+    for (const figure of figures.values()) {
+      if (!figure.live) continue;
+      const { data, layout } = layoutFor(figure, dark.matches ? "dark" : "light");
+      figure.busy = true;
+      await Plotly.react(figure.live, data, layout, config);
+      figure.busy = false;
+      await settle(figure);
+    }
+  });
+})();

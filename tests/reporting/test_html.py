@@ -1,0 +1,210 @@
+"""The page: one file, nothing from outside, nothing unescaped, the same every time."""
+
+import base64
+import gzip
+import hashlib
+import html.parser
+import json
+import re
+
+import numpy as np
+import pytest
+from report_figures import EVIL, every_figure, spectrum
+
+from tdacoustic.reporting import (
+    Axis,
+    Column,
+    Details,
+    Document,
+    Facts,
+    Figure,
+    FigureBlock,
+    Line,
+    Notice,
+    Paragraph,
+    ReportError,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.document import ORIGINS
+from tdacoustic.reporting.html import csv_cell, render_html, safe_json
+
+COLUMNS = (
+    Column("channel", "Channel"),
+    Column("level_db", "Level", "dB re 20 uPa", digits=1, kind="number"),
+    Column("origin", "Origin", kind="origin"),
+    Column("verdict", "Check", kind="verdict"),
+    Column("valid", "Valid"),
+)
+
+
+def table(name: str = "levels", word: str = "mic_1") -> Table:
+    rows = [(word, -3.25, "measured", "ok", True), ("=cmd()", np.nan, "assumed", "bad", False)]
+    return Table(name, f"Levels of {word}", COLUMNS, rows, origin="measured")
+
+
+def document(word: str = "mic_1") -> Document:
+    return Document(
+        f"Report {word}",
+        word,
+        "synthetic",
+        summary=[Paragraph(word), Sentences([word]), table(word=word)],
+        notices=[Notice("synthetic", word), Notice("bad", word)],
+        sections=[
+            Section("one", word, [FigureBlock(figure, "calculated") for figure in every_figure()]),
+            Section("two", "Two", [Section("inner", word, [FigureBlock(spectrum("evil", word), "assumed")])]),
+            Section("three", "Three", [Facts([(word, word, "printed")]), Details(word, [table("folded", word)])]),
+        ],
+        facts=[("Program", word)],
+        footer=[word],
+    )
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return render_html(document(EVIL))
+
+
+class Elements(html.parser.HTMLParser):
+    """Every element of a page, with its attributes."""
+
+    def __init__(self, page: str) -> None:
+        super().__init__()
+        self.found: list[tuple[str, dict[str, str | None]]] = []
+        self.feed(page)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.found.append((tag, dict(attrs)))
+
+
+def test_the_same_document_gives_the_same_bytes(page: str) -> None:
+    assert page == render_html(document(EVIL))
+
+
+def test_nothing_is_loaded_from_anywhere(page: str) -> None:
+    for tag, attributes in Elements(page).found:
+        assert tag not in ("link", "iframe", "object", "embed", "base", "form"), tag
+        for key in ("src", "srcset", "action", "data", "poster"):
+            value = attributes.get(key)
+            assert value is None or value.startswith("data:image/png;base64,"), (tag, key)
+        assert (attributes.get("href") or "#").startswith("#")
+        assert not any(key.startswith("on") for key in attributes)
+    own = re.sub(r'<script type="text/plain" id="plotly">[^<]*', "", page)
+    assert "http://" not in own and "https://" not in own
+    assert "url(" not in own and "@import" not in own
+
+
+def test_only_the_two_named_scripts_may_run(page: str) -> None:
+    policy = next(a["content"] for t, a in Elements(page).found if t == "meta" and a.get("http-equiv"))
+    assert policy is not None and policy.startswith("default-src 'none'; script-src 'sha256-")
+    packed = re.search(r'id="plotly">([^<]*)</script>', page)
+    assert packed is not None
+    plotly = gzip.decompress(base64.b64decode(packed[1]))
+    assert plotly[:100].count(b"plotly.js")
+    scripts = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    assert len(scripts) == 1
+    for source in (plotly, scripts[0].encode()):
+        assert base64.b64encode(hashlib.sha256(source).digest()).decode() in policy
+    assert "unsafe-inline" not in policy.split("script-src")[1].split(";")[0]
+
+
+def test_names_from_files_stay_text(page: str) -> None:
+    elements = Elements(page).found
+    assert not any(tag == "img" and attributes.get("src") == "x" for tag, attributes in elements)
+    assert "&lt;/script&gt;&lt;img" in page
+    for text in re.findall(r'<script type="application/json"[^>]*>(.*?)</script>', page):
+        assert not set("<>&\u2028\u2029") & set(text)
+        json.loads(text)
+
+
+def test_json_is_inert_and_strict() -> None:
+    assert json.loads(safe_json(EVIL)) == EVIL
+    assert not set("<>&\u2028") & set(safe_json(EVIL))
+    with pytest.raises(ValueError, match="JSON"):
+        safe_json(float("nan"))
+
+
+@pytest.mark.parametrize(
+    ("cell", "safe"),
+    [
+        ("=cmd()", "'=cmd()"),
+        ("+1+1", "'+1+1"),
+        ("@x", "'@x"),
+        ("-x", "'-x"),
+        ("\t=1", "'\t=1"),
+        ("-3.2", "-3.2"),
+        ("a=b", "a=b"),
+    ],
+)
+def test_formulas_are_disarmed_in_downloads(cell: str, safe: str) -> None:
+    assert csv_cell(cell) == safe
+
+
+def test_cells_show_one_thing_and_download_another(page: str) -> None:
+    assert 'data-v="&#39;=cmd()">=cmd()</th>' in page
+    assert '<td class="right" data-v="-3.25">\u22123.2</td>' in page
+    assert '<td class="right" data-v="">\u2013</td>' in page
+    assert '<td data-v="true">yes</td>' in page
+    assert '<td><span class="chip origin-measured">measured</span></td>' in page
+    assert '<td><span class="chip verdict-bad">bad</span></td>' in page
+
+
+def test_structure_is_semantic_and_anchors_are_unique(page: str) -> None:
+    elements = Elements(page).found
+    ids = [attributes["id"] for _, attributes in elements if "id" in attributes]
+    assert len(ids) == len(set(ids))
+    targets = {a["href"][1:] for t, a in elements if t == "a" and a.get("href")}
+    assert targets <= set(ids)
+    assert ("html", {"lang": "en"}) in elements
+    assert [tag for tag, _ in elements].count("h1") == 1
+    assert all(attributes.get("scope") in ("col", "row") for tag, attributes in elements if tag == "th")
+    assert all(attributes.get("alt") for tag, attributes in elements if tag == "img")
+    labelled = [a["aria-labelledby"] for _, a in elements if a.get("aria-labelledby")]
+    assert set(labelled) <= set(ids)
+
+
+def test_later_figures_are_still_pictures_and_the_page_says_so() -> None:
+    page = render_html(document(), max_interactive=2)
+    assert page.count('<script type="application/json">{"data"') == 2
+    assert "Of the 5 figures of this page the first 2 can be zoomed" in page
+    assert page.count("A still picture") == 3
+    small = render_html(document(), max_figure_bytes=10)
+    assert 'id="plotly"' not in small and len(small) < 600_000
+
+
+def test_a_page_without_figures_has_no_plotly() -> None:
+    page = render_html(Document("Report", "", "measured", sections=[Section("one", "One", [Paragraph("text")])]))
+    assert len(page) < 60_000 and 'id="plotly"' not in page
+
+
+def test_size_of_a_page_with_ten_long_spectra() -> None:
+    blocks = [FigureBlock(spectrum(f"s{k}")) for k in range(10)]
+    page = render_html(Document("Report", "", "measured", sections=[Section("one", "One", blocks)]))
+    assert len(page.encode()) < 5_500_000  # 2 MB of plotly, 0.3 MB a figure of four long traces
+
+
+@pytest.mark.parametrize("origin", ORIGINS)
+def test_every_origin_is_said_in_words(origin: str) -> None:
+    page = render_html(Document("Report", "", origin))
+    assert f'<span class="chip origin-{origin}">{origin}</span>' in page
+
+
+def test_wrong_documents_are_refused() -> None:
+    line = Figure("f", "F", "", Axis("x"), Axis("y"), [Line([0], [0], "a")])
+    with pytest.raises(ReportError, match="two of the document's figures are named f"):
+        Document(
+            "R", "", "measured", sections=[Section("a", "A", [FigureBlock(line), Details("d", [FigureBlock(line)])])]
+        )
+    with pytest.raises(ReportError, match="two of the document's sections are named summary"):
+        Document("R", "", "measured", sections=[Section("summary", "A", [])])
+    with pytest.raises(ReportError, match="origin of a document must be one of"):
+        Document("R", "", "guessed")
+    with pytest.raises(ReportError, match="row 0 of table 't' has 1 cells, expected 5"):
+        Table("t", "", COLUMNS, [("a",)])
+    with pytest.raises(ReportError, match="column 'level_db' of table 't' is of numbers, got '3'"):
+        Table("t", "", COLUMNS, [("a", "3", "measured", "ok", True)])
+    with pytest.raises(ReportError, match="row 0 of table 't' must be one of"):
+        Table("t", "", COLUMNS, [("a", 3, "guess", "ok", True)])
+    with pytest.raises(ReportError, match="kind of a notice"):
+        Notice("shout", "text")
