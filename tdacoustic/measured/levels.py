@@ -1,0 +1,158 @@
+"""Levels of runs and conditions, corrected for background."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from tdacoustic.campaign import CampaignRun
+from tdacoustic.measured.results import ChannelResult
+from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.recording import Channel
+from tdacoustic.spectra import correct_for_background
+from tdacoustic.units import level_db, reference_label
+
+__all__ = ["ConditionLevels", "RunLevel", "condition_levels", "energy_mean_db"]
+
+
+def energy_mean_db(levels_db: Iterable[float]) -> float | None:
+    """Return the energy mean of levels, or None of none.
+
+    Examples
+    --------
+    >>> round(energy_mean_db([80.0, 83.0]), 2)
+    81.76
+    """
+    held = list(levels_db)
+    return 10.0 * math.log10(sum(10.0 ** (0.1 * level) for level in held) / len(held)) if held else None
+
+
+@dataclass(frozen=True)
+class RunLevel:
+    """One row of ``levels.csv``: a channel of a run.
+
+    Levels are None where the quantity has none or the channel is not usable;
+    `level_db` and `laeq_db` are corrected for background, `rms` is as measured.
+    """
+
+    run: str
+    condition: str | None
+    train_speed_km_h: float | None
+    channel: str
+    component: str | None
+    quantity: str
+    rms: float | None
+    level_db: float | None
+    reference: str | None
+    laeq_db: float | None
+    background_db: float | None
+    correction: str
+    si_unit: str
+    level_band_db: float | None
+    level_band_from_hz: float
+    level_band_to_hz: float
+
+
+@dataclass(frozen=True)
+class ConditionLevels:
+    """Levels of all runs, and the speed of each condition.
+
+    Parameters
+    ----------
+    runs : tuple of RunLevel
+    train_speed_km_h : mapping of str to float or None
+        By condition: the mean over its runs.
+    """
+
+    runs: tuple[RunLevel, ...]
+    train_speed_km_h: Mapping[str, float | None]
+
+
+def condition_levels(runs: Sequence[MeasuredRun]) -> ConditionLevels:
+    """Return the levels of the test runs, corrected for the campaign's background runs.
+
+    A background run with a condition is that condition's alone, one without is
+    everybody's; several are averaged in energy.
+    """
+    rows = []
+    speeds: dict[str, list[float]] = {}
+    for run in runs:
+        if run.run.kind != "test":
+            continue
+        condition = run.run.condition or ""
+        speeds.setdefault(condition, [])
+        if run.train_speed_km_h is not None:
+            speeds[condition].append(run.train_speed_km_h)
+        if run.measurement is None or run.recording is None:
+            continue
+        background = _backgrounds(runs, run.run)
+        rows += [
+            _run_level(run, run.recording[result.channel], result, background) for result in run.measurement.channels
+        ]
+    return ConditionLevels(
+        tuple(rows),
+        {name: sum(values) / len(values) if values else None for name, values in speeds.items()},
+    )
+
+
+def _backgrounds(runs: Sequence[MeasuredRun], of_run: CampaignRun) -> Mapping[str, tuple[float | None, float | None]]:
+    """Background level and A-weighted level of each channel."""
+    held = [
+        run
+        for run in runs
+        if run.run.kind == "background"
+        and run.measurement is not None
+        and run.run.condition in (None, of_run.condition)
+    ]
+    own = [run for run in held if run.run.condition is not None]
+    levels: dict[str, list[ChannelResult]] = {}
+    quantities: dict[str, str] = {}
+    for run in own or held:
+        assert run.measurement is not None and run.recording is not None
+        for result in run.measurement.channels:
+            if result.usable:
+                levels.setdefault(result.channel, []).append(result)
+                quantities[result.channel] = run.recording[result.channel].quantity
+    return {
+        name: (
+            energy_mean_db(level for r in results if (level := level_db(r.rms, quantities[name])) is not None),
+            energy_mean_db(r.laeq_db for r in results if r.laeq_db is not None),
+        )
+        for name, results in levels.items()
+    }
+
+
+def _run_level(
+    run: MeasuredRun,
+    channel: Channel,
+    result: ChannelResult,
+    backgrounds: Mapping[str, tuple[float | None, float | None]],
+) -> RunLevel:
+    background_db, background_a_db = backgrounds.get(channel.name, (None, None))
+    level = level_db(result.rms, channel.quantity) if result.usable else None
+    corrected, laeq_db, correction = level, result.laeq_db if result.usable else None, "none"
+    if level is not None:
+        outcome = correct_for_background(level, background_db)
+        corrected, correction = outcome.level_db, outcome.kind
+    if laeq_db is not None:
+        laeq_db = correct_for_background(laeq_db, background_a_db).level_db
+    band = None if result.band_rms is None or not result.usable else level_db(result.band_rms, channel.quantity)
+    return RunLevel(
+        run=run.name,
+        condition=run.run.condition,
+        train_speed_km_h=run.train_speed_km_h,
+        channel=channel.name,
+        component=channel.component,
+        quantity=channel.quantity,
+        rms=result.rms if result.usable else None,
+        level_db=corrected,
+        reference=reference_label(channel.quantity),
+        laeq_db=laeq_db,
+        background_db=background_db if level is not None else None,
+        correction=correction,
+        si_unit=channel.si_symbol,
+        level_band_db=band,
+        level_band_from_hz=result.level_band_hz[0],
+        level_band_to_hz=result.level_band_hz[1],
+    )

@@ -1,0 +1,157 @@
+"""Levels and third octaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+import numpy as np
+
+from tdacoustic.measured.runs import receivers
+from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.figure import Axis, Bars, Figure, Line, Markers
+from tdacoustic.reporting.sections.words import measured_channels, pretty_unit, slug, tested_runs
+from tdacoustic.results import Analysis
+from tdacoustic.units import REFERENCES, level_db, reference_label
+
+__all__ = ["levels"]
+
+
+def levels(analysis: Analysis) -> Section:
+    """Return the section on levels and third octaves."""
+    blocks: list[Block] = []
+    figure = _overview(analysis)
+    if figure is not None:
+        blocks.append(FigureBlock(figure, analysis.campaign.origin))
+    blocks.append(_table(analysis))
+    blocks.append(
+        Paragraph(
+            "The rms is of the whole record after its mean is removed; the level is that rms, corrected for background "
+            "where background runs exist. The A-weighted level applies the analytic curve of IEC 61672-1 to the "
+            "spectrum. The level in the band leaves out what lies outside the band given beside it."
+        )
+    )
+    blocks += _bands(analysis)
+    return Section("levels", "Levels", blocks)
+
+
+def _overview(analysis: Analysis) -> Figure | None:
+    table = analysis.tables["levels"]
+    table = table[(table["quantity"] == "sound_pressure")]
+    microphones = receivers(analysis.runs) or tuple(dict.fromkeys(table["channel"]))
+    runs = list(dict.fromkeys(table["run"]))
+    if len(runs) < 2 or not microphones or table["level_db"].isna().all():
+        return None
+    bars = []
+    for name in microphones:
+        held = table[table["channel"] == name].set_index("run")
+        bars.append(Bars(runs, np.array([held["level_db"].get(run, np.nan) for run in runs]), name))
+    return Figure(
+        "sound-pressure-levels",
+        "Sound pressure level by run",
+        "Unweighted level of the whole run, corrected for background where that was recorded.",
+        Axis("Run"),
+        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        bars,
+        height=320,
+    )
+
+
+def _table(analysis: Analysis) -> Table:
+    table = analysis.tables["levels"]
+    with_background = bool(table["background_db"].notna().any())
+    bands = {_band_words(row) for row in table.to_dict("records")} - {""}
+    columns = [
+        Column("run", "Run"),
+        Column("channel", "Channel"),
+        Column("quantity", "Quantity"),
+        Column("rms", "rms", "SI", 4, "number"),
+        Column("si_unit", "Unit"),
+        Column("level_db", "Level", "dB", 1, "number"),
+        Column("laeq_db", "A-weighted", "dB(A)", 1, "number"),
+        Column("level_band_db", "In the band", "dB", 1, "number"),
+    ]
+    if len(bands) > 1:
+        columns.append(Column("band", "Band"))
+    if with_background:
+        columns += [Column("background_db", "Background", "dB", 1, "number"), Column("correction", "Correction")]
+    rows = [[_cell(row, column) for column in columns] for row in table.to_dict("records")]
+    band = f"; the band is {next(iter(bands))}" if len(bands) == 1 else ""
+    references = "sound pressure re 20 µPa, acceleration re 1 µm/s²"
+    return Table("levels", f"Levels ({references}{band})", columns, rows, origin=analysis.campaign.origin)
+
+
+def _band_words(row: Mapping[Hashable, Any]) -> str:
+    if math.isnan(row["level_band_from_hz"]):
+        return ""
+    return f"{row['level_band_from_hz']:.4g} to {row['level_band_to_hz']:.5g} Hz"
+
+
+def _cell(row: Mapping[Hashable, Any], column: Column) -> Any:
+    if column.key == "band":
+        return _band_words(row)
+    value = row[column.key]
+    if column.kind == "number":
+        return value
+    words = value if isinstance(value, str) else ""
+    return (
+        pretty_unit(words)
+        if column.key == "si_unit"
+        else words.replace("_", " ")
+        if column.key == "quantity"
+        else words
+    )
+
+
+def _bands(analysis: Analysis) -> list[Block]:
+    """One figure a channel, all runs in it: microphones in sight, the rest folded away."""
+    by_channel: dict[str, list[Line | Markers]] = {}
+    quantities: dict[str, str] = {}
+    for run in tested_runs(analysis):
+        for channel, result in measured_channels(run):
+            if not result.bands or channel.quantity not in REFERENCES:
+                continue
+            x = np.array([band.nominal_hz for band in result.bands])
+            found = [level_db(math.sqrt(band.mean_square), channel.quantity) for band in result.bands]
+            y = np.array([np.nan if level is None else level for level in found])
+            slot = len([e for e in by_channel.get(channel.name, []) if isinstance(e, Line)]) % 8
+            elements = by_channel.setdefault(channel.name, [])
+            elements.append(Line(x, y, f"run {run.name}", style="steps", color=slot))
+            doubtful = [index for index, band in enumerate(result.bands) if band.filter_dependent]
+            if doubtful:
+                elements.append(
+                    Markers(
+                        x[doubtful],
+                        y[doubtful],
+                        f"run {run.name}: depends on the filter",
+                        symbol="x",
+                        color=slot,
+                    )
+                )
+            quantities[channel.name] = channel.quantity
+    figures = {
+        name: FigureBlock(_band_figure(name, quantities[name], elements), analysis.campaign.origin)
+        for name, elements in by_channel.items()
+    }
+    near = [figures[name] for name in figures if quantities[name] == "sound_pressure"]
+    far = [figures[name] for name in figures if quantities[name] != "sound_pressure"]
+    blocks: list[Block] = [*near]
+    if far:
+        blocks.append(Details(f"Third octaves of {len(far)} vibration channels", far))
+    return [Section("third-octaves", "Third octaves", blocks)] if blocks else []
+
+
+def _band_figure(name: str, quantity: str, elements: list[Line | Markers]) -> Figure:
+    label = "Sound pressure level" if quantity == "sound_pressure" else "Acceleration level"
+    return Figure(
+        slug("bands", name),
+        f"Third-octave levels, {name}",
+        "Class-1 filters (IEC 61260-1). A cross marks a band within three bands of a line that is more than 15 dB "
+        "stronger: its level depends on the skirts of the filter, and another analyser may show several dB more or "
+        "less.",
+        Axis("Frequency", "Hz", "log"),
+        Axis(label, "dB", reference=pretty_unit(reference_label(quantity) or ""), note="in third octaves"),
+        elements,
+        height=360,
+    )

@@ -1,0 +1,135 @@
+"""What was measured: the campaign, its channels and its runs."""
+
+from __future__ import annotations
+
+from tdacoustic.recording import Channel
+from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Table
+from tdacoustic.reporting.sections.words import pretty_unit, speed_words
+from tdacoustic.results import Analysis
+
+__all__ = ["measured"]
+
+
+def measured(analysis: Analysis) -> Section:
+    """Return the section on channels and runs."""
+    blocks: list[Block] = []
+    if analysis.campaign.meta:
+        blocks.append(Facts(list(analysis.campaign.meta)))
+    if analysis.runs:
+        blocks.append(_runs(analysis))
+    if analysis.campaign.channels:
+        blocks.append(_channels(analysis))
+    if analysis.campaign.levels:
+        blocks.append(_known_levels(analysis))
+    blocks += _judgements(analysis)
+    return Section("measured", "What was measured", blocks)
+
+
+def _runs(analysis: Analysis) -> Table:
+    rows = []
+    for run in analysis.runs:
+        state = "left out"
+        if run.measurement is not None:
+            state = "steady" if run.measurement.steady else "run-up"
+        duration = max((c.duration_s for c in run.recording.channels), default=None) if run.recording else None
+        rows.append(
+            (
+                run.name,
+                run.run.condition or "",
+                run.run.kind,
+                run.run.mode or "",
+                speed_words(run),
+                duration,
+                state,
+                ", ".join(log.text for log in run.run.logs),
+            )
+        )
+    columns = (
+        Column("run", "Run"),
+        Column("condition", "Condition"),
+        Column("kind", "Kind"),
+        Column("mode", "Mode"),
+        Column("speed", "Speed"),
+        Column("duration_s", "Length", "s", 2, "number"),
+        Column("state", "State"),
+        Column("logs", "Logs"),
+    )
+    return Table("runs", "Runs", columns, rows)
+
+
+def _channels(analysis: Analysis) -> Table:
+    bound: dict[str, Channel] = {}
+    for run in analysis.runs:
+        for channel in run.recording.channels if run.recording is not None else ():
+            bound.setdefault(channel.name, channel)
+    rows = []
+    for stated in analysis.campaign.channels:
+        used = bound.get(stated.name)
+        place = [stated.component or "", stated.direction or "", stated.role or "", stated.side or ""]
+        rows.append(
+            (
+                stated.name,
+                (used.quantity if used else stated.quantity or "").replace("_", " "),
+                " ".join(word for word in place if word),
+                stated.distance_m,
+                used.sample_rate_hz if used else None,
+                pretty_unit(used.si_symbol) if used else "",
+                pretty_unit(used.scaling) if used else "not used",
+            )
+        )
+    columns = (
+        Column("channel", "Channel"),
+        Column("quantity", "Quantity"),
+        Column("place", "Place"),
+        Column("distance_m", "Distance", "m", None, "number"),
+        Column("sample_rate_hz", "Rate", "Hz", None, "number"),
+        Column("unit", "SI unit"),
+        Column("scaling", "Conversion of the log's numbers"),
+    )
+    return Table("channels", "Channels", columns, rows)
+
+
+def _known_levels(analysis: Analysis) -> Table:
+    rows = [
+        (
+            level.condition,
+            level.distance_m,
+            level.level_db,
+            level.sigma_db,
+            level.weighting,
+            level.origin or "not stated",
+        )
+        for level in analysis.campaign.levels
+    ]
+    columns = (
+        Column("condition", "Condition"),
+        Column("distance_m", "Distance", "m", None, "number"),
+        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
+        Column("sigma_db", "Standard deviation", "dB", 1, "number"),
+        Column("weighting", "Weighting"),
+        Column("origin", "Origin"),
+    )
+    return Table("known-levels", "Levels known without logs", columns, rows, origin="printed")
+
+
+def _judgements(analysis: Analysis) -> list[Block]:
+    campaign = analysis.campaign
+    rows = [
+        ("excluded", e.condition, e.channel or "all", f"{e.frequency_hz[0]:g} to {e.frequency_hz[1]:g} Hz", e.reason)
+        for e in campaign.excludes
+    ]
+    rows += [
+        ("override", o.condition, "all", f"{o.frequency_hz:g} Hz is of the {o.source}", o.reason)
+        for o in campaign.overrides
+    ]
+    if not rows:
+        return []
+    columns = (
+        Column("kind", "Kind"),
+        Column("condition", "Condition"),
+        Column("channel", "Channel"),
+        Column("what", "What"),
+        Column("reason", "Reason"),
+    )
+    table = Table("judgements", "Exclusions and overrides by the engineer", columns, rows)
+    return [Details("Exclusions and overrides by the engineer", [table])] if len(rows) > 12 else [table]

@@ -1,0 +1,103 @@
+"""The measured side of a campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tdacoustic.attribution import Dominance, SourceLine
+from tdacoustic.campaign import Campaign
+from tdacoustic.errors import AnalysisError
+from tdacoustic.measured import ChannelResult
+from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.spectra import Spectrum
+from tdacoustic.steps import Record
+from tdacoustic.steps.provenance import versions
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["Analysis", "LogInput"]
+
+
+@dataclass(frozen=True)
+class LogInput:
+    """A log that entered the analysis."""
+
+    written: str
+    sha256: str
+    n_bytes: int
+    format: str
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """The measured side of a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    runs : tuple of MeasuredRun
+    sources : tuple of SourceLine
+    dominance : tuple of Dominance
+    tables : mapping of str to DataFrame
+        ``quality``, ``levels``, ``bands``, ``lines``, ``sources``, ``dominance``.
+    problems : tuple of str
+        What could not be done, one line each.
+    inputs : tuple of LogInput
+    records : tuple of (str, Record)
+        Key and record of every step, upstream first.
+
+    Examples
+    --------
+    ``analyze("campaign.toml").tables["levels"]`` is a pandas frame.
+    """
+
+    campaign: Campaign
+    runs: tuple[MeasuredRun, ...]
+    sources: tuple[SourceLine, ...]
+    dominance: tuple[Dominance, ...]
+    tables: Mapping[str, pd.DataFrame]
+    problems: tuple[str, ...]
+    inputs: tuple[LogInput, ...]
+    records: tuple[tuple[str, Record], ...]
+
+    def result(self, run: str, channel: str) -> ChannelResult:
+        """Return spectrum, levels and lines of a channel of a run.
+
+        Raises
+        ------
+        AnalysisError
+            There is no such run, or no such channel in it.
+        """
+        for measured in self.runs:
+            if measured.name == run:
+                found = measured.measurement.channel(channel) if measured.measurement is not None else None
+                if found is None:
+                    raise AnalysisError(f"run {run!r} has no channel {channel!r}")
+                return found
+        raise AnalysisError(f"no run {run!r}; there are {', '.join(m.name for m in self.runs)}")
+
+    def spectrum(self, run: str, channel: str) -> Spectrum:
+        """Return the averaged spectrum of a channel of a run.
+
+        Raises
+        ------
+        AnalysisError
+            There is none: a run-up is not averaged.
+        """
+        spectrum = self.result(run, channel).spectrum
+        if spectrum is None:
+            raise AnalysisError(f"run {run!r}, channel {channel!r}: a run-up has no averaged spectrum")
+        return spectrum
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """Every setting of ``[analysis]`` with its value."""
+        return {key: value for key, value in self.campaign.settings.items() if key.startswith("analysis.")}
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of Python and the libraries that made the numbers."""
+        return dict(next((record.libraries for _, record in self.records), versions()))

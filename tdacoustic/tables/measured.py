@@ -1,0 +1,183 @@
+"""The tables of the measured side as views of its results."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from tdacoustic.attribution import Dominance, SourceLine
+from tdacoustic.campaign import Campaign
+from tdacoustic.measured.levels import ConditionLevels, RunLevel
+from tdacoustic.measured.results import ChannelResult
+from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.tables.schema import COLUMNS, TEXT_COLUMNS
+from tdacoustic.units import level_db
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["measured_tables"]
+
+Row = dict[str, Any]
+
+
+def measured_tables(
+    campaign: Campaign,
+    runs: Sequence[MeasuredRun],
+    levels: ConditionLevels,
+    sources: Sequence[SourceLine],
+    dominance: Sequence[Dominance],
+) -> dict[str, pd.DataFrame]:
+    """Return ``quality``, ``levels``, ``bands``, ``lines``, ``sources`` and ``dominance`` as frames.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    runs : sequence of MeasuredRun
+    levels : ConditionLevels
+    sources, dominance : sequences
+        Of the attribution.
+    """
+    tested = [run for run in runs if run.run.kind == "test" and run.measurement is not None]
+    rows: dict[str, Iterable[Row]] = {
+        "quality": _quality_rows(campaign, runs),
+        "levels": _level_rows(campaign, levels),
+        "bands": _band_rows(tested),
+        "lines": _line_rows(tested),
+        "sources": _source_rows(sources),
+        "dominance": _dominance_rows(dominance, levels),
+    }
+    return {name: _frame(name, table) for name, table in rows.items()}
+
+
+def _frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
+    import pandas as pd
+
+    columns = COLUMNS[name].split()
+    held = list(rows)
+    data = {column: [row.get(column) for row in held] for column in columns}
+    frame = pd.DataFrame({column: pd.Series(values, dtype=_dtype(column, values)) for column, values in data.items()})
+    return frame[columns]
+
+
+def _dtype(column: str, values: Sequence[Any]) -> str:
+    if column in TEXT_COLUMNS:
+        return "str"
+    return "bool" if values and all(isinstance(value, bool) for value in values) else "float64"
+
+
+def _quality_rows(campaign: Campaign, runs: Sequence[MeasuredRun]) -> Iterator[Row]:
+    for run in runs:
+        for verdict in run.all_verdicts:
+            yield {"run": run.name, **{key: getattr(verdict, key) for key in ("channel", "check", "verdict", "detail")}}
+    for level in campaign.levels:
+        origin = level.origin or "origin not stated"
+        words = f"{level.level_db:g} dB at {level.distance_m:g} m in condition {level.condition}, {origin}"
+        yield {"run": "", "channel": "", "check": "level without log", "verdict": "ok", "detail": words}
+
+
+def _components(run: MeasuredRun) -> Mapping[str, str | None]:
+    return {} if run.recording is None else {channel.name: channel.component for channel in run.recording.channels}
+
+
+def _level_rows(campaign: Campaign, levels: ConditionLevels) -> Iterator[Row]:
+    yield from (_level_row(level) for level in levels.runs)
+    for number, known in enumerate(campaign.levels, start=1):
+        yield {
+            "run": f"level {number}",
+            "condition": known.condition,
+            "train_speed_km_h": levels.train_speed_km_h.get(known.condition),
+            "channel": f"{known.distance_m:g} m",
+            "component": "air",
+            "quantity": "sound_pressure",
+            "rms": 20e-6 * 10.0 ** (known.level_db / 20.0) if known.weighting == "Z" else None,
+            "level_db": known.level_db if known.weighting == "Z" else None,
+            "reference": "20 uPa",
+            "laeq_db": known.level_db if known.weighting == "A" else None,
+            "correction": "none",
+            "si_unit": "Pa",
+        }
+
+
+def _level_row(level: RunLevel) -> Row:
+    return {key: getattr(level, key) for key in COLUMNS["levels"].split()}
+
+
+def _band_rows(runs: Sequence[MeasuredRun]) -> Iterator[Row]:
+    for run, result in _usable(runs):
+        quantity = _quantity(run, result)
+        for band in result.bands:
+            yield {
+                "run": run.name,
+                "condition": run.run.condition,
+                "channel": result.channel,
+                "band_hz": band.nominal_hz,
+                "level_db": level_db(math.sqrt(band.mean_square), quantity),
+                "filter_dependent": band.filter_dependent,
+            }
+
+
+def _usable(runs: Sequence[MeasuredRun]) -> Iterator[tuple[MeasuredRun, ChannelResult]]:
+    for run in runs:
+        if run.measurement is not None:
+            yield from ((run, result) for result in run.measurement.channels if result.usable)
+
+
+def _quantity(run: MeasuredRun, result: ChannelResult) -> str:
+    return "other" if run.recording is None else run.recording[result.channel].quantity
+
+
+def _line_rows(runs: Sequence[MeasuredRun]) -> Iterator[Row]:
+    for run, result in _usable(runs):
+        quantity, component = _quantity(run, result), _components(run).get(result.channel)
+        turns_hz = run.motor_speed_hz
+        families = {
+            index: f"{family.fundamental_hz:.6g} Hz x {number}"
+            for family in result.families
+            for index, number in family.members
+        }
+        for index, line in enumerate(result.lines):
+            yield {
+                "run": run.name,
+                "condition": run.run.condition,
+                "channel": result.channel,
+                "component": component,
+                "frequency_hz": line.frequency_hz,
+                "frequency_error_hz": line.frequency_error_hz,
+                "level_db": level_db(line.rms, quantity),
+                "prominence_db": line.prominence_db,
+                "order": line.frequency_hz / turns_hz if turns_hz else None,
+                "family": families.get(index),
+                "rms": line.rms,
+            }
+
+
+def _source_rows(sources: Sequence[SourceLine]) -> Iterator[Row]:
+    for source in sources:
+        yield {
+            "condition": source.line.condition,
+            "channel": source.line.channel,
+            "frequency_hz": source.line.frequency_hz,
+            "level_db": level_db(math.sqrt(source.line.mean_square), "sound_pressure"),
+            "radiator": source.radiator,
+            "excitation": source.excitation,
+            "source": source.source,
+            "conflict": source.conflict,
+            "confidence": source.confidence,
+            "evidence": source.evidence,
+        }
+
+
+def _dominance_rows(dominance: Sequence[Dominance], levels: ConditionLevels) -> Iterator[Row]:
+    for verdict in dominance:
+        yield {
+            "condition": verdict.condition,
+            "train_speed_km_h": levels.train_speed_km_h.get(verdict.condition),
+            "weighting": "Z",
+            "dominant": verdict.dominant,
+            **{f"{name}_share": share for name, share in verdict.shares.items()},
+            "line_fraction": verdict.line_fraction,
+            "dominant_excitation": verdict.dominant_excitation,
+            "confidence": verdict.confidence,
+        }

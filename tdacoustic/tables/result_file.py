@@ -1,0 +1,91 @@
+"""``result.h5``: spectra, floors, bands, lines and speeds of all runs, for other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from tdacoustic.measured.results import ChannelResult, RunMeasurement
+from tdacoustic.measured.runs import MeasuredRun
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["SCHEMA", "write_result_file"]
+
+SCHEMA = "tdacoustic-result-file/1"
+
+
+def write_result_file(path: Path, name: str, origin: str, runs: Sequence[MeasuredRun]) -> None:
+    """Write the arrays of all runs.
+
+    Layout: ``/<run>/speed/<channel>`` (time, speed), ``/<run>/channels/<channel>/``
+    with ``frequency_hz``, ``density`` (mean square per Hz), ``floor_density``,
+    ``line_frequency_hz``, ``line_rms``, ``band_hz``, ``band_mean_square``, and for a
+    run-up ``map_time_s``, ``map_frequency_hz``, ``map_density``. A ``/`` in a name becomes ``_``.
+
+    Parameters
+    ----------
+    path : Path
+    name, origin : str
+        Of the campaign.
+    runs : sequence of MeasuredRun
+    """
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.attrs["schema"] = SCHEMA
+        file.attrs["name"] = name
+        file.attrs["origin"] = origin
+        for run in runs:
+            group = file.create_group(run.name.replace("/", "_"))
+            group.attrs["condition"] = run.run.condition or ""
+            group.attrs["kind"] = run.run.kind
+            if run.measurement is not None:
+                _write_run(group, run.measurement)
+
+
+def _put(group: h5py.Group, name: str, values: Any, unit: str) -> None:
+    array = np.asarray(values, dtype=np.float64)
+    options = {"compression": "gzip", "shuffle": True} if array.size > 1024 else {}
+    dataset = group.create_dataset(name, data=array, track_times=False, **options)
+    dataset.attrs["unit"] = unit
+
+
+def _write_run(group: h5py.Group, measurement: RunMeasurement) -> None:
+    group.attrs["steady"] = measurement.steady
+    for profile in measurement.speed.profiles:
+        speed = group.require_group("speed").create_group(profile.channel.replace("/", "_"))
+        speed.attrs["shaft"] = profile.shaft or ""
+        _put(speed, "time_s", profile.times_s, "s")
+        _put(speed, "speed", profile.speed, profile.si_symbol)
+    channels = group.create_group("channels")
+    for result in measurement.channels:
+        _write_channel(channels.create_group(result.channel.replace("/", "_")), result)
+
+
+def _write_channel(group: h5py.Group, result: ChannelResult) -> None:
+    group.attrs["usable"] = result.usable
+    group.attrs["rms"] = result.rms
+    spectrum = result.spectrum
+    if spectrum is not None:
+        unit = f"({spectrum.si_symbol})^2/Hz"
+        group.attrs["quantity"] = spectrum.quantity
+        group.attrs["noise_bandwidth_hz"] = spectrum.noise_bandwidth_hz
+        group.attrs["averages"] = spectrum.averages
+        _put(group, "frequency_hz", spectrum.frequencies_hz, "Hz")
+        _put(group, "density", spectrum.density, unit)
+        if result.floor is not None:
+            _put(group, "floor_density", result.floor, unit)
+        _put(group, "line_frequency_hz", [line.frequency_hz for line in result.lines], "Hz")
+        _put(group, "line_rms", [line.rms for line in result.lines], spectrum.si_symbol)
+    if result.bands:
+        _put(group, "band_hz", [band.nominal_hz for band in result.bands], "Hz")
+        _put(group, "band_mean_square", [band.mean_square for band in result.bands], "SI^2")
+    if result.map is not None:
+        _put(group, "map_time_s", result.map.times_s, "s")
+        _put(group, "map_frequency_hz", result.map.frequencies_hz, "Hz")
+        _put(group, "map_density", result.map.density, "SI^2/Hz")

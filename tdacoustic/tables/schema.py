@@ -1,0 +1,32 @@
+"""Columns of the tables. The contract is fixed: columns may be added at the end, none changes."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+from typing import Final
+
+__all__ = ["COLUMNS", "TEXT_COLUMNS"]
+
+COLUMNS: Final = MappingProxyType(
+    {
+        "quality": "run channel check verdict detail",
+        "levels": "run condition train_speed_km_h channel component quantity rms level_db reference laeq_db "
+        "background_db correction si_unit level_band_db level_band_from_hz level_band_to_hz",
+        "bands": "run condition channel band_hz level_db filter_dependent",
+        "lines": "run condition channel component frequency_hz frequency_error_hz level_db prominence_db order "
+        "family rms",
+        "sources": "condition channel frequency_hz level_db radiator excitation source conflict confidence evidence",
+        "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
+        "unassigned_share line_fraction dominant_excitation confidence",
+    }
+)
+"""Columns by table, separated by spaces."""
+
+TEXT_COLUMNS: Final = frozenset(
+    {
+        *("run", "condition", "channel", "component", "quantity", "reference", "correction", "si_unit", "family"),
+        *("check", "verdict", "detail"),
+        *("radiator", "excitation", "source", "evidence", "weighting", "dominant", "dominant_excitation"),
+    }
+)
+"""Columns that hold words, even where the words are digits."""

@@ -1,0 +1,1 @@
+"""The commands of tdacoustic as functions, one file each."""

@@ -1,0 +1,154 @@
+"""Output folders: written aside, moved into place, manifest last."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from tdacoustic.errors import OutputError, TdacousticError
+
+__all__ = ["MANIFEST", "OutputFolder", "default_output"]
+
+MANIFEST = "manifest.json"
+SCHEMA = "tdacoustic-manifest/1"
+
+
+def default_output(toml_file: Path) -> Path:
+    """Return ``reports/<name of the folder the TOML is in>`` below the working directory."""
+    return Path("reports") / toml_file.resolve().parent.name
+
+
+def _relative(path: Path, start: Path) -> str:
+    try:
+        return Path(os.path.relpath(path.resolve(), start.resolve())).as_posix()
+    except ValueError:  # another drive
+        return path.resolve().as_posix()
+
+
+class OutputFolder:
+    """A result folder that never holds a half-written file, used as a context.
+
+    Files are written to `staging`, a folder beside the target. On leaving the
+    context without an error a new target is renamed into place whole. An
+    existing one is refreshed file by file: first its manifest is marked
+    incomplete, the new manifest comes last, and files that the old manifest
+    named and the new result lacks are taken away. On an error nothing changes.
+
+    Parameters
+    ----------
+    path : Path
+    subject : Path
+        The campaign or fleet file that the results are of. A folder whose
+        manifest names the same subject is refreshed; anything else in the way
+        is refused.
+    overwrite : bool
+        Write over whatever is there; foreign files of other names stay.
+
+    Raises
+    ------
+    OutputError
+        Something else is in the way, or the folder cannot be written.
+    """
+
+    def __init__(self, path: Path, subject: Path, overwrite: bool = False) -> None:
+        self.path = path
+        whole = path.absolute() if path.name not in ("", "..") else path.resolve()  # "." and ".." name no folder
+        self.staging = whole.with_name(f".{whole.name}.partial")
+        self.manifest: dict[str, Any] = {}
+        self._subject = _relative(subject, path)
+        try:
+            self._check(overwrite)
+        except PermissionError as error:
+            raise OutputError(f"{self.path}: cannot be read ({error.strerror})") from error
+
+    def _check(self, overwrite: bool) -> None:
+        if self.path.exists() and not self.path.is_dir():
+            raise OutputError(f"{self.path}: a file is in the way of the output folder")
+        if overwrite or not self.path.is_dir() or not any(self.path.iterdir()):
+            return
+        held = self._old_manifest()
+        if held is None:
+            raise OutputError(f"{self.path}: the folder is not empty and not a result of tdacoustic; give --overwrite")
+        if held.get("subject") != self._subject:
+            raise OutputError(
+                f"{self.path}: the folder holds results of {held.get('subject')!r}, not of {self._subject!r}; "
+                "give --overwrite or another -o"
+            )
+
+    def _old_manifest(self) -> dict[str, Any] | None:
+        try:
+            held = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return (
+            held if isinstance(held, dict) and str(held.get("schema", "")).startswith("tdacoustic-manifest/") else None
+        )
+
+    def __enter__(self) -> OutputFolder:
+        try:
+            if self.staging.exists():
+                shutil.rmtree(self.staging)
+            self.staging.mkdir(parents=True)
+        except OSError as error:
+            raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
+        return self
+
+    def write_text(self, name: str, text: str) -> None:
+        """Write one file of the result."""
+        target = self.staging / name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(text.encode("utf-8"))
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None:
+                self._publish()
+            elif isinstance(error, OSError) and not isinstance(error, TdacousticError):
+                raise error
+        except OSError as failure:
+            raise OutputError(f"{self.path}: cannot be written ({failure})") from failure
+        finally:
+            shutil.rmtree(self.staging, ignore_errors=True)
+
+    def _publish(self) -> None:
+        names = sorted(p.relative_to(self.staging).as_posix() for p in self.staging.rglob("*") if p.is_file())
+        files = {name: _sha256(self.staging / name) for name in names}
+        document = {"schema": SCHEMA, "subject": self._subject, "complete": True, **self.manifest, "files": files}
+        (self.staging / MANIFEST).write_text(_json(document), encoding="utf-8")
+        if not self.path.exists():
+            self.staging.replace(self.path)
+            return
+        old = self._old_manifest() or {}
+        marker = self.staging / f"{MANIFEST}.incomplete"
+        known = sorted({*old.get("files", {}), *names})
+        marker.write_text(
+            _json({"schema": SCHEMA, "subject": self._subject, "complete": False, "files": dict.fromkeys(known)}),
+            encoding="utf-8",
+        )
+        marker.replace(self.path / MANIFEST)
+        for name in names:
+            target = self.path / name
+            target.parent.mkdir(parents=True, exist_ok=True)
+            (self.staging / name).replace(target)
+        for name in set(old.get("files", {})) - set(names):
+            stale = (self.path / name).resolve()
+            if stale.is_relative_to(self.path.resolve()):
+                stale.unlink(missing_ok=True)
+        (self.staging / MANIFEST).replace(self.path / MANIFEST)
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def _json(document: Mapping[str, Any]) -> str:
+    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

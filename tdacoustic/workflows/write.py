@@ -1,0 +1,64 @@
+"""Results of the measured side as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from tdacoustic.workflows.output import OutputFolder
+
+if TYPE_CHECKING:
+    from tdacoustic.results import Analysis
+
+__all__ = ["write_analysis", "write_check"]
+
+
+def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> None:
+    """Write tables, ``result.h5`` and ``report.html`` of an analysis into an output folder.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    folder : OutputFolder
+        Not entered yet.
+    command : str
+        For the manifest.
+    """
+    from tdacoustic.reporting.html import render_html
+    from tdacoustic.reporting.measured_report import measured_report
+    from tdacoustic.tables import csv_text
+    from tdacoustic.tables.result_file import write_result_file
+
+    campaign = analysis.campaign
+    with folder:
+        for name, table in analysis.tables.items():
+            folder.write_text(f"{name}.csv", csv_text(table))
+        write_result_file(folder.staging / "result.h5", campaign.name, campaign.origin, analysis.runs)
+        folder.write_text("report.html", render_html(measured_report(analysis)))
+        folder.manifest = _manifest(analysis, command)
+
+
+def write_check(analysis: Analysis, out: Path, subject: Path, overwrite: bool) -> None:
+    """Write ``quality.csv`` alone into an output folder."""
+    from tdacoustic.tables import csv_text
+
+    with OutputFolder(out, subject, overwrite) as folder:
+        folder.write_text("quality.csv", csv_text(analysis.tables["quality"]))
+        folder.manifest = _manifest(analysis, "check")
+
+
+def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
+    """Return what the manifest says besides its files."""
+    campaign = analysis.campaign
+    return {
+        "command": command,
+        "campaign": {"name": campaign.name, "origin": campaign.origin},
+        "inputs": [
+            {"file": log.written, "sha256": log.sha256, "bytes": log.n_bytes, "format": log.format}
+            for log in analysis.inputs
+        ],
+        "settings": {key: list(v) if isinstance(v, tuple) else v for key, v in analysis.settings.items()},
+        "steps": sorted({f"{record.step}/{record.version}" for _, record in analysis.records}),
+        "versions": analysis.versions,
+        "problems": list(analysis.problems),
+    }

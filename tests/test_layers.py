@@ -1,0 +1,160 @@
+"""The order of the rooms: who may import whom, nested imports too; and what an import may cost."""
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+PACKAGE = ROOT / "tdacoustic"
+
+ALLOWED = {
+    "errors": "",
+    "units": "errors",
+    "recording": "errors",
+    "formats": "recording units errors",
+    "campaign": "units errors",
+    "ingest": "campaign recording units errors",
+    "speed": "errors",
+    "spectra": "units errors",
+    "lines": "spectra errors",
+    "quality": "lines spectra speed recording units errors",
+    "steps": "errors",
+    "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
+    "attribution": "measured campaign errors",
+    "results": "attribution measured campaign spectra steps errors",
+    "tables": "attribution measured campaign units errors",
+    "reporting": "results tables attribution measured campaign quality lines spectra speed recording units errors "
+    "__version__",
+    "synthesis": "errors",
+    "workflows": "reporting tables results attribution measured steps quality lines spectra speed ingest campaign "
+    "formats recording units errors",
+    "cli": "workflows synthesis results campaign errors __version__",
+    "__main__": "cli",
+    "__init__": "",
+}
+"""Which rooms a room may import, directly and nested in its functions; a room that is not here fails the test."""
+
+SIGNAL_CORE = ("speed", "spectra", "lines", "quality")
+NOT_IN_THE_CORE = frozenset(
+    "h5py soundfile matplotlib plotly rich typer pathlib io os shutil tempfile csv pandas subprocess logging".split()
+)
+CALLS_NOT_IN_THE_CORE = frozenset({"open", "print", "input"})
+
+HEAVY = "scipy pandas matplotlib plotly h5py lmfit librosa numba ngsolve soundfile pyuff pyoctaveband".split()
+
+
+def room_of(path):
+    return path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+
+
+def modules():
+    return sorted(PACKAGE.rglob("*.py"))
+
+
+def imported(path):
+    """Each imported module's full name and line; lazy imports by name count too."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}:{node.lineno}: a relative import"
+            if node.module == "tdacoustic":
+                yield from ((f"tdacoustic.{alias.name}", node.lineno) for alias in node.names)
+            else:
+                yield node.module, node.lineno
+        elif isinstance(node, ast.Call) and getattr(node.func, "id", getattr(node.func, "attr", "")) in (
+            "import_module",
+            "__import__",
+        ):
+            yield from (
+                (argument.value, node.lineno)
+                for argument in node.args
+                if isinstance(argument, ast.Constant) and isinstance(argument.value, str)
+            )
+
+
+def inner_imports():
+    """(room, imported room, where) for each import of one room by another."""
+    for path in modules():
+        for name, line in imported(path):
+            parts = name.split(".")
+            if parts[0] == "tdacoustic" and len(parts) > 1 and parts[1] != room_of(path):
+                yield room_of(path), parts[1], f"{path.relative_to(ROOT)}:{line}"
+
+
+def test_every_room_imports_only_what_is_upstream():
+    faults = [
+        f"{where}: {room} must not import {target}"
+        for room, target, where in inner_imports()
+        if target not in ALLOWED.get(room, "").split()
+    ]
+    assert not faults, "\n".join(faults)
+
+
+def test_every_room_has_its_line_in_the_table():
+    rooms = {room_of(path) for path in modules()}
+    assert rooms <= set(ALLOWED), f"without a line: {sorted(rooms - set(ALLOWED))}"
+    assert set(ALLOWED) <= rooms, f"rooms that are no more: {sorted(set(ALLOWED) - rooms)}"
+
+
+def test_the_table_has_no_cycle():
+    order: list[str] = []
+    waiting = {room: set(allowed.split()) - {"__version__"} for room, allowed in ALLOWED.items()}
+    while waiting:
+        free = [room for room, upstream in waiting.items() if upstream <= set(order)]
+        assert free, f"these import each other in a circle: {sorted(waiting)}"
+        order += free
+        waiting = {room: upstream for room, upstream in waiting.items() if room not in free}
+
+
+@pytest.mark.parametrize("room", SIGNAL_CORE)
+def test_the_signal_core_touches_no_file_plot_or_terminal(room):
+    faults = []
+    for path in (path for path in modules() if room_of(path) == room):
+        faults += [
+            f"{path.name}:{line}: imports {name}"
+            for name, line in imported(path)
+            if name.split(".")[0] in NOT_IN_THE_CORE
+        ]
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            called = getattr(getattr(node, "func", None), "id", None) if isinstance(node, ast.Call) else None
+            if called in CALLS_NOT_IN_THE_CORE:
+                faults.append(f"{path.name}:{node.lineno}: calls {called}")
+            if isinstance(node, (ast.Global, ast.Nonlocal)):
+                faults.append(f"{path.name}:{node.lineno}: a global")
+    assert not faults, "\n".join(faults)
+
+
+def test_the_reading_of_imports_sees_nested_and_lazy_ones(tmp_path):
+    path = tmp_path / "module.py"
+    path.write_text(
+        "import json\ndef f():\n    from tdacoustic.cli import main\n    from tdacoustic import formats\n"
+        "    import_module('tdacoustic.steps')\nif False:\n    import h5py\n"
+    )
+    assert {name for name, _ in imported(path)} == {
+        "json",
+        "tdacoustic.cli",
+        "tdacoustic.formats",
+        "tdacoustic.steps",
+        "h5py",
+    }
+
+
+def loaded_by(statement):
+    code = f"import sys; {statement}; print(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    return set(
+        subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, check=True).stdout.decode().split()
+    )
+
+
+@pytest.mark.parametrize("statement", ["import tdacoustic.cli", "import tdacoustic; dir(tdacoustic)"])
+def test_importing_the_program_loads_nothing_heavy(statement):
+    assert not loaded_by(statement) & set(HEAVY)
+
+
+def test_the_package_itself_loads_nothing_beyond_the_standard_library():
+    foreign = loaded_by("import tdacoustic") - loaded_by("import importlib, typing") - {"tdacoustic"}
+    assert foreign <= set(sys.stdlib_module_names), f"import tdacoustic loads {sorted(foreign)}"
