@@ -8,6 +8,7 @@ allowed and where it stands (file, channel, key).
 __all__ = [
     "AnalysisError",
     "CampaignError",
+    "FleetError",
     "FormatError",
     "MissingFileError",
     "OutputError",
@@ -39,6 +40,10 @@ class UnitError(TdacousticError, ValueError):
 
 class CampaignError(TdacousticError, ValueError):
     """A campaign file is wrong: unknown key, bad value, or contradiction."""
+
+
+class FleetError(TdacousticError, ValueError):
+    """A fleet file is wrong, or lacks a parameter that is needed."""
 
 
 class RecipeError(TdacousticError, ValueError):

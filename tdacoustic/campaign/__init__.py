@@ -4,11 +4,11 @@ from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.load import load_campaign
 from tdacoustic.campaign.model import SCHEMA, Campaign
-from tdacoustic.campaign.names import legal_name, name_problem
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.scale import Scale
 from tdacoustic.campaign.settings import AnalysisSettings, CalibrationSettings
 from tdacoustic.campaign.values import WrittenPath
+from tdacoustic.toml_models import legal_name, name_problem
 
 __all__ = [
     "SCHEMA",

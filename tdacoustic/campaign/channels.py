@@ -6,9 +6,8 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from tdacoustic.campaign.names import Name
 from tdacoustic.campaign.scale import Scale, full_scale_of
-from tdacoustic.campaign.values import NonNegative, Positive, Table, Text
+from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text
 from tdacoustic.units import parse_sensitivity, parse_unit
 
 __all__ = ["CampaignChannel", "Component", "Quantity", "Role"]

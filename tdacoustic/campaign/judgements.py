@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from tdacoustic.campaign.names import Name
-from tdacoustic.campaign.values import FrequencyBand, Positive, Table, Text
+from tdacoustic.campaign.values import FrequencyBand
+from tdacoustic.toml_models import Name, Positive, Table, Text
 
 __all__ = ["Exclude", "Level", "Override", "Source"]
 

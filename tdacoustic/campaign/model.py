@@ -12,8 +12,9 @@ from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.settings import AnalysisSettings, CalibrationSettings
-from tdacoustic.campaign.values import StatedPath, Table, Text, WrittenPath
+from tdacoustic.campaign.values import StatedPath, WrittenPath
 from tdacoustic.errors import CampaignError
+from tdacoustic.toml_models import Table, Text
 
 __all__ = ["SCHEMA", "Campaign", "CampaignFile", "Origin"]
 

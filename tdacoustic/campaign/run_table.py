@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 from typing import Any, Final
 
-from tdacoustic.campaign.messages import unknown_key
+from tdacoustic.campaign.messages import VOCABULARY
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.errors import CampaignError, MissingFileError
 
@@ -36,7 +36,7 @@ def _columns(path: Path, header: list[str]) -> list[str]:
         if not column:
             raise CampaignError(f"{path}: column {number} has no name in line 1")
         if column not in CampaignRun.model_fields:
-            raise CampaignError(f"{path}: column {number}: {unknown_key(column, '[[run]]')}")
+            raise CampaignError(f"{path}: column {number}: {VOCABULARY.unknown_key(column, '[[run]]')}")
         if column in columns[: number - 1]:
             raise CampaignError(f"{path}: column {column!r} stands twice")
     if "logs" not in columns:

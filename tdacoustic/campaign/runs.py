@@ -8,8 +8,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from tdacoustic.campaign.names import Name
-from tdacoustic.campaign.values import NonNegative, Positive, StatedPath, Table, Text
+from tdacoustic.campaign.values import StatedPath
+from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text
 
 __all__ = ["CampaignRun", "Kind", "Mode", "with_names"]
 

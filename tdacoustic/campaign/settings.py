@@ -6,7 +6,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from tdacoustic.campaign.values import FrequencyBand, NonNegative, Positive, Table, Text
+from tdacoustic.campaign.values import FrequencyBand
+from tdacoustic.toml_models import NonNegative, Positive, Table, Text
 
 __all__ = ["AnalysisSettings", "CalibrationSettings"]
 

@@ -1,4 +1,4 @@
-"""Kinds of values that several tables of a campaign share."""
+"""Paths and bands, which several tables of a campaign have."""
 
 from __future__ import annotations
 
@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationInfo
+from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 
-__all__ = ["FrequencyBand", "NonNegative", "Positive", "StatedPath", "Table", "Text", "WrittenPath"]
+from tdacoustic.toml_models import NonNegative
 
-
-class Table(BaseModel):
-    """A table of ``campaign.toml``: frozen, no unknown keys, no conversion between types, no NaN or infinity."""
-
-    model_config = ConfigDict(strict=True, frozen=True, extra="forbid", allow_inf_nan=False)
+__all__ = ["FrequencyBand", "StatedPath", "WrittenPath"]
 
 
 @dataclass(frozen=True)
@@ -51,26 +47,11 @@ def _path(value: Any, info: ValidationInfo) -> WrittenPath:
     return WrittenPath.of(value, (info.context or {}).get("folder", Path()))
 
 
-def _text(value: str) -> str:
-    if not value.strip():
-        raise ValueError("must not be empty")
-    return value
-
-
 def _ascending(value: tuple[float, float]) -> tuple[float, float]:
     if not value[0] < value[1]:
         raise ValueError(f"must be [from, to] with from < to, got [{value[0]:g}, {value[1]:g}]")
     return value
 
-
-Text = Annotated[str, AfterValidator(_text)]
-"""A text that is not empty."""
-
-Positive = Annotated[float, Field(gt=0.0)]
-"""A finite number above zero."""
-
-NonNegative = Annotated[float, Field(ge=0.0)]
-"""A finite number, zero or above."""
 
 FrequencyBand = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ascending)]
 """``[from, to]`` in Hz."""

@@ -12,10 +12,10 @@ from typing import Final
 
 from tdacoustic.campaign import SCHEMA, legal_name
 from tdacoustic.campaign.channels import Component
-from tdacoustic.campaign.names import unique_name
 from tdacoustic.errors import CampaignError, OutputError, UnitError
 from tdacoustic.formats import scan
 from tdacoustic.recording import Log, LogChannel
+from tdacoustic.toml_models import unique_name
 from tdacoustic.units import parse_unit, quantity_of_unit
 
 __all__ = ["InitResult", "campaign_text", "make_campaign", "toml_string", "write_campaign"]

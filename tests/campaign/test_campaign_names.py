@@ -3,7 +3,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tdacoustic.campaign import legal_name, name_problem
-from tdacoustic.campaign.names import MAX_NAME_LENGTH, unique_name
+from tdacoustic.toml_models import MAX_NAME_LENGTH, unique_name
 
 
 @pytest.mark.parametrize("name", ["a", "1", "Motor Z (left) #1", "电机_1", "Мотор/3", "Ölwanne-2.b", "हिन्दी", "a" * 64])

@@ -1,0 +1,43 @@
+"""``fleet.toml`` section by section, under the file's own keys."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Final
+
+from pydantic import Field
+
+from tdacoustic.fleet.gear_dynamics import GearDynamics
+from tdacoustic.fleet.gear_pair import GearPair
+from tdacoustic.fleet.housing import Housing
+from tdacoustic.fleet.masuda import Masuda
+from tdacoustic.fleet.model import Model
+from tdacoustic.fleet.motor import Motor
+from tdacoustic.fleet.operation import Operation
+from tdacoustic.fleet.radiation import Radiation
+from tdacoustic.fleet.train import Train
+from tdacoustic.toml_models import Table, Text
+
+__all__ = ["SCHEMA", "SECTIONS", "FleetFile"]
+
+SCHEMA: Final = "tdacoustic-fleet/1"
+"""What ``schema`` has to say."""
+
+
+class FleetFile(Table):
+    """``fleet.toml`` (``schema`` is checked before)."""
+
+    name: Text | None = None
+    meta: dict[str, Any] = Field(default_factory=dict)
+    train: Train
+    gear_pair: Annotated[tuple[GearPair, ...], Field(min_length=1)]
+    gear_dynamics: GearDynamics | None = None
+    operation: Operation = Operation()
+    masuda: Masuda = Masuda()
+    model: Model = Model()
+    motor: Motor | None = None
+    housing: Housing | None = None
+    radiation: Radiation = Radiation()
+
+
+SECTIONS: Final = tuple(name for name in FleetFile.model_fields if name not in ("name", "meta"))
+"""Names of the sections, in the order of the file."""

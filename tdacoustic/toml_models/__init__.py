@@ -1,0 +1,40 @@
+"""What the TOML files that people write have in common: strict tables, names, reading, one-line messages."""
+
+from tdacoustic.toml_models.messages import (
+    MAX_LINES,
+    TOP_LEVEL,
+    Vocabulary,
+    file_error,
+    joined,
+    nearest,
+    problem_words,
+    shown,
+)
+from tdacoustic.toml_models.names import MAX_NAME_LENGTH, Name, legal_name, name_problem, unique_name
+from tdacoustic.toml_models.reading import check_schema, file_or_inside, frozen, meta_lines, read_toml
+from tdacoustic.toml_models.values import NonNegative, Positive, Table, Text
+
+__all__ = [
+    "MAX_LINES",
+    "MAX_NAME_LENGTH",
+    "TOP_LEVEL",
+    "Name",
+    "NonNegative",
+    "Positive",
+    "Table",
+    "Text",
+    "Vocabulary",
+    "check_schema",
+    "file_error",
+    "file_or_inside",
+    "frozen",
+    "joined",
+    "legal_name",
+    "meta_lines",
+    "name_problem",
+    "nearest",
+    "problem_words",
+    "read_toml",
+    "shown",
+    "unique_name",
+]
