@@ -154,11 +154,11 @@ def check(
 ) -> None:
     """Check the recordings of a campaign; exit 1 if a run cannot be used."""
     from tdacoustic.workflows.check import unusable_runs
+    from tdacoustic.workflows.output import default_output
     from tdacoustic.workflows.write import write_check
 
     analysis = _analysed(campaign, store, jobs, quiet)
-    if out is not None:
-        write_check(analysis, out, _toml(campaign), overwrite)
+    write_check(analysis, out or default_output(_toml(campaign)), _toml(campaign), overwrite)
     table = analysis.tables["quality"]
     if not quiet:
         for row in table[table["verdict"] != "ok"].to_dict("records"):

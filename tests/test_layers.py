@@ -15,7 +15,9 @@ ALLOWED = {
     "units": "errors",
     "recording": "errors",
     "formats": "recording units errors",
-    "campaign": "units errors",
+    "toml_models": "errors",
+    "fleet": "toml_models errors",
+    "campaign": "toml_models units errors",
     "ingest": "campaign recording units errors",
     "speed": "errors",
     "spectra": "units errors",
@@ -23,14 +25,14 @@ ALLOWED = {
     "quality": "lines spectra speed recording units errors",
     "steps": "errors",
     "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
-    "attribution": "measured campaign errors",
-    "results": "attribution measured campaign spectra steps errors",
-    "tables": "attribution measured campaign units errors",
-    "reporting": "results tables attribution measured campaign quality lines spectra speed recording units errors "
-    "__version__",
+    "attribution": "measured quality lines spectra speed campaign fleet steps units errors",
+    "results": "attribution measured campaign fleet spectra steps errors",
+    "tables": "attribution measured campaign fleet units errors",
+    "reporting": "results tables attribution measured campaign fleet quality lines spectra speed recording units "
+    "errors __version__",
     "synthesis": "errors",
     "workflows": "reporting tables results attribution measured steps quality lines spectra speed ingest campaign "
-    "formats recording units errors",
+    "fleet toml_models formats recording units errors",
     "cli": "workflows synthesis results campaign errors __version__",
     "__main__": "cli",
     "__init__": "",
@@ -39,11 +41,15 @@ ALLOWED = {
 
 SIGNAL_CORE = ("speed", "spectra", "lines", "quality")
 NOT_IN_THE_CORE = frozenset(
-    "h5py soundfile matplotlib plotly rich typer pathlib io os shutil tempfile csv pandas subprocess logging".split()
+    {"csv", "h5py", "io", "logging", "matplotlib", "os", "pandas", "pathlib", "plotly", "rich", "shutil", "soundfile"}
+    | {"subprocess", "sys", "tempfile", "time", "typer"}
 )
 CALLS_NOT_IN_THE_CORE = frozenset({"open", "print", "input"})
 
-HEAVY = "scipy pandas matplotlib plotly h5py lmfit librosa numba ngsolve soundfile pyuff pyoctaveband".split()
+HEAVY = frozenset(
+    {"h5py", "librosa", "lmfit", "matplotlib", "ngsolve", "numba", "pandas", "plotly", "pyoctaveband", "pyuff"}
+    | {"scipy", "soundfile"}
+)
 
 
 def room_of(path):
@@ -152,7 +158,7 @@ def loaded_by(statement):
 
 @pytest.mark.parametrize("statement", ["import tdacoustic.cli", "import tdacoustic; dir(tdacoustic)"])
 def test_importing_the_program_loads_nothing_heavy(statement):
-    assert not loaded_by(statement) & set(HEAVY)
+    assert not loaded_by(statement) & HEAVY
 
 
 def test_the_package_itself_loads_nothing_beyond_the_standard_library():

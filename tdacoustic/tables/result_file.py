@@ -25,7 +25,8 @@ def write_result_file(path: Path, name: str, origin: str, runs: Sequence[Measure
     Layout: ``/<run>/speed/<channel>`` (time, speed), ``/<run>/channels/<channel>/``
     with ``frequency_hz``, ``density`` (mean square per Hz), ``floor_density``,
     ``line_frequency_hz``, ``line_rms``, ``band_hz``, ``band_mean_square``, and for a
-    run-up ``map_time_s``, ``map_frequency_hz``, ``map_density``. A ``/`` in a name becomes ``_``.
+    run-up ``map_time_s``, ``map_frequency_hz``, ``map_density``. A ``/`` in a name becomes ``_``,
+    with more of them where that name is taken; the attribute ``name`` holds it as it is.
 
     Parameters
     ----------
@@ -41,11 +42,21 @@ def write_result_file(path: Path, name: str, origin: str, runs: Sequence[Measure
         file.attrs["name"] = name
         file.attrs["origin"] = origin
         for run in runs:
-            group = file.create_group(run.name.replace("/", "_"))
+            group = _group(file, run.name)
             group.attrs["condition"] = run.run.condition or ""
             group.attrs["kind"] = run.run.kind
             if run.measurement is not None:
                 _write_run(group, run.measurement)
+
+
+def _group(parent: h5py.Group, name: str) -> h5py.Group:
+    """Make the group of a run or channel."""
+    shown = name.replace("/", "_")
+    while shown in parent:
+        shown += "_"
+    group = parent.create_group(shown)
+    group.attrs["name"] = name
+    return group
 
 
 def _put(group: h5py.Group, name: str, values: Any, unit: str) -> None:
@@ -58,13 +69,13 @@ def _put(group: h5py.Group, name: str, values: Any, unit: str) -> None:
 def _write_run(group: h5py.Group, measurement: RunMeasurement) -> None:
     group.attrs["steady"] = measurement.steady
     for profile in measurement.speed.profiles:
-        speed = group.require_group("speed").create_group(profile.channel.replace("/", "_"))
+        speed = _group(group.require_group("speed"), profile.channel)
         speed.attrs["shaft"] = profile.shaft or ""
         _put(speed, "time_s", profile.times_s, "s")
         _put(speed, "speed", profile.speed, profile.si_symbol)
     channels = group.create_group("channels")
     for result in measurement.channels:
-        _write_channel(channels.create_group(result.channel.replace("/", "_")), result)
+        _write_channel(_group(channels, result.channel), result)
 
 
 def _write_channel(group: h5py.Group, result: ChannelResult) -> None:

@@ -181,7 +181,7 @@ def _measured(
         return MeasuredRun(run, None, None, (Verdict("", "run", "warning", f"rejected: {run.reject_reason}"),))
     error = prepared.error or failures.get(run.name)
     if error is not None or prepared.bound is None:
-        return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {error}"),))
+        return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {_words(run, error)}"),))
     measurement = result_of(tasks[run.name], store)
     verdicts = [Verdict("", "log", "warning", flag) for flag in prepared.flags]
     measured = MeasuredRun(run, prepared.bound.recording, measurement, tuple(verdicts))
@@ -191,12 +191,20 @@ def _measured(
     return measured
 
 
+def _words(run: CampaignRun, error: TdacousticError | None) -> str:
+    """Return an error with the run's logs as the campaign writes them: a copied campaign gives the same result."""
+    text = str(error)
+    for log in run.logs:
+        text = text.replace(str(log.path), log.text)
+    return text
+
+
 def _problems(prepared: Sequence[_Prepared], failures: Mapping[str, TdacousticError]) -> list[str]:
     found = []
     for item in prepared:
         error = item.error or failures.get(item.run.name)
         if error is not None:
-            found.append(f"run {item.run.name!r} is left out: {error}")
+            found.append(f"run {item.run.name!r} is left out: {_words(item.run, error)}")
         elif item.bound is not None:
             found += [refusal.reason for refusal in item.bound.refused]
     return found

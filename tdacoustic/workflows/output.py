@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import glob
 import hashlib
 import json
 import os
 import shutil
+import time
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
 from typing import Any
+from uuid import uuid4
 
 from tdacoustic.errors import OutputError, TdacousticError
 
@@ -17,6 +20,9 @@ __all__ = ["MANIFEST", "OutputFolder", "default_output"]
 
 MANIFEST = "manifest.json"
 SCHEMA = "tdacoustic-manifest/1"
+
+_LEFT_OVER_S = 3600.0
+"""A staging folder in which nothing was written for this long was left by a run that was killed."""
 
 
 def default_output(toml_file: Path) -> Path:
@@ -49,6 +55,8 @@ class OutputFolder:
         is refused.
     overwrite : bool
         Write over whatever is there; foreign files of other names stay.
+    keep : bool
+        Refresh the files that are written and keep the others of the result.
 
     Raises
     ------
@@ -56,21 +64,23 @@ class OutputFolder:
         Something else is in the way, or the folder cannot be written.
     """
 
-    def __init__(self, path: Path, subject: Path, overwrite: bool = False) -> None:
+    def __init__(self, path: Path, subject: Path, overwrite: bool = False, keep: bool = False) -> None:
         self.path = path
         whole = path.absolute() if path.name not in ("", "..") else path.resolve()  # "." and ".." name no folder
-        self.staging = whole.with_name(f".{whole.name}.partial")
+        self.staging = whole.with_name(f".{whole.name}.{uuid4().hex[:8]}.partial")
         self.manifest: dict[str, Any] = {}
         self._subject = _relative(subject, path)
+        self._overwrite = overwrite
+        self._keep = keep
         try:
-            self._check(overwrite)
+            self._check()
         except PermissionError as error:
             raise OutputError(f"{self.path}: cannot be read ({error.strerror})") from error
 
-    def _check(self, overwrite: bool) -> None:
+    def _check(self) -> None:
         if self.path.exists() and not self.path.is_dir():
             raise OutputError(f"{self.path}: a file is in the way of the output folder")
-        if overwrite or not self.path.is_dir() or not any(self.path.iterdir()):
+        if self._overwrite or not self.path.is_dir() or not any(self.path.iterdir()):
             return
         held = self._old_manifest()
         if held is None:
@@ -92,12 +102,18 @@ class OutputFolder:
 
     def __enter__(self) -> OutputFolder:
         try:
-            if self.staging.exists():
-                shutil.rmtree(self.staging)
+            self._sweep()
             self.staging.mkdir(parents=True)
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
         return self
+
+    def _sweep(self) -> None:
+        """Take away what killed runs left beside the target long ago; a fresh one may be of a run at this moment."""
+        name, _ = self.staging.name.removesuffix(".partial").rsplit(".", 1)
+        for left in self.staging.parent.glob(f"{glob.escape(name)}.????????.partial"):
+            if time.time() - left.stat().st_mtime > _LEFT_OVER_S:
+                shutil.rmtree(left, ignore_errors=True)
 
     def write_text(self, name: str, text: str) -> None:
         """Write one file of the result."""
@@ -121,12 +137,21 @@ class OutputFolder:
     def _publish(self) -> None:
         names = sorted(p.relative_to(self.staging).as_posix() for p in self.staging.rglob("*") if p.is_file())
         files = {name: _sha256(self.staging / name) for name in names}
+        old = self._old_manifest() or {}
+        if self._keep and old.get("complete") and old.get("subject") == self._subject:
+            self.manifest = {key: value for key, value in old.items() if key not in ("schema", "subject", "complete")}
+            files = {**old["files"], **files}
         document = {"schema": SCHEMA, "subject": self._subject, "complete": True, **self.manifest, "files": files}
         (self.staging / MANIFEST).write_text(_json(document), encoding="utf-8")
         if not self.path.exists():
-            self.staging.replace(self.path)
-            return
-        old = self._old_manifest() or {}
+            try:
+                self.staging.replace(self.path)
+            except OSError:
+                if not self.path.is_dir():
+                    raise
+            else:
+                return
+        self._check()  # another run may have written it meanwhile
         marker = self.staging / f"{MANIFEST}.incomplete"
         known = sorted({*old.get("files", {}), *names})
         marker.write_text(
@@ -138,7 +163,7 @@ class OutputFolder:
             target = self.path / name
             target.parent.mkdir(parents=True, exist_ok=True)
             (self.staging / name).replace(target)
-        for name in set(old.get("files", {})) - set(names):
+        for name in set(old.get("files", {})) - set(files):
             stale = (self.path / name).resolve()
             if stale.is_relative_to(self.path.resolve()):
                 stale.unlink(missing_ok=True)

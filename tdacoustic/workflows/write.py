@@ -39,10 +39,10 @@ def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> No
 
 
 def write_check(analysis: Analysis, out: Path, subject: Path, overwrite: bool) -> None:
-    """Write ``quality.csv`` alone into an output folder."""
+    """Write ``quality.csv`` into an output folder, beside what a whole run has left there."""
     from tdacoustic.tables import csv_text
 
-    with OutputFolder(out, subject, overwrite) as folder:
+    with OutputFolder(out, subject, overwrite, keep=True) as folder:
         folder.write_text("quality.csv", csv_text(analysis.tables["quality"]))
         folder.manifest = _manifest(analysis, "check")
 

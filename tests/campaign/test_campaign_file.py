@@ -146,6 +146,7 @@ def test_the_whole_contract_is_read(load, tmp_path):
         "analysis.level_band_hz": (20.0, 5000.0),
         "analysis.frequency_resolution_hz": 1.0,
         "analysis.overlap": 0.5,
+        "analysis.run_up_resolution_hz": 8.0,
         "analysis.line_prominence_db": AnalysisSettings().line_prominence_db,
         "analysis.speed_tolerance": 0.03,
         "analysis.mains_hz": 50.0,

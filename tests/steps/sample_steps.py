@@ -1,0 +1,60 @@
+"""Small steps to run, importable by a spawned worker."""
+
+import os
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from tdacoustic.errors import AnalysisError
+from tdacoustic.steps import Step, log_file
+from tdacoustic.steps.progress import tell_progress
+
+
+def numbers(settings, logs=()):
+    """Read the logs, and make numbers that depend on them and on the settings."""
+    seed = settings[0] + sum(len(log.path.read_bytes()) for log in logs)
+    values = np.random.default_rng(seed).standard_normal((64, 64))
+    tell_progress(0.5)
+    return ("numbers", values @ values.T, np.linalg.svd(values, compute_uv=False))
+
+
+def total(settings, one, other):
+    return (settings, float(one[1].sum() + other[2].sum()))
+
+
+def failing(settings, **inputs):
+    raise AnalysisError(f"no result for {settings}")
+
+
+def broken(settings):
+    raise ZeroDivisionError("a defect")
+
+
+def dying(settings):
+    os._exit(3)
+
+
+def slow(settings):
+    (Path(settings[0]) / str(os.getpid())).touch()
+    time.sleep(settings[1])
+    return settings
+
+
+NUMBERS = Step("numbers", 1, numbers, "Numbers")
+TOTAL = Step("total", 1, total, "Total")
+FAILING = Step("failing", 1, failing, "Failing")
+BROKEN = Step("broken", 1, broken, "Broken")
+DYING = Step("dying", 1, dying, "Dying")
+SLOW = Step("slow", 1, slow, "Slow")
+
+
+def log_of(path, text="abc"):
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text)
+    return log_file(path)
+
+
+def raised(step, **changes):
+    return replace(step, **changes)
