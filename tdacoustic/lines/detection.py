@@ -31,6 +31,12 @@ FREQUENCY_VARIANCE = (0.096, 1.03)
 the floor: fitted to simulations at 50 % overlap, s from 4 to 10000; a test holds it."""
 
 
+BROAD = 0.2
+"""A peak whose neighbours beyond its main lobe hold more than this part of its power is broad."""
+WIDEST = 64
+"""Half width at which a broad peak is no longer widened, in lines of the spectrum."""
+
+
 @dataclass(frozen=True)
 class Line:
     """One line of a spectrum.
@@ -45,7 +51,8 @@ class Line:
     prominence_db : float
         Level of the sinusoid minus that of the floor in one noise bandwidth.
     width_hz : float
-        Rms width beyond that of the window; 0 for a steady line.
+        Rms width beyond that of the window; 0 for a steady line. A narrow resonance
+        that noise excites shows as one line, and this tells it from a sinusoid.
     """
 
     frequency_hz: float
@@ -72,6 +79,18 @@ def _interpolated_offset(excess: Array, peak: int) -> float:
     side = 1.0 if right >= left else -1.0
     ratio = math.sqrt(max(left, right, 0.0) / excess[peak])
     return side * float(np.clip((2.0 * ratio - 1.0) / (ratio + 1.0), -0.5, 0.5))
+
+
+def _reach(excess: Array, peak: int, least: int, scatter: float) -> int:
+    """Half width of a peak: widened while most of the lines just beyond still belong to it, and not to the scatter."""
+    limit = max(BROAD * float(excess[peak]), scatter)
+    for reach in range(least, WIDEST):
+        left = excess[max(0, peak - reach - 3) : max(0, peak - reach)]
+        right = excess[peak + reach + 1 : peak + reach + 4]
+        beside = np.concatenate((left, right))
+        if beside.size == 0 or float(np.median(beside)) <= limit:
+            return reach
+    return max(least, WIDEST)
 
 
 def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int) -> Line | None:
@@ -133,13 +152,14 @@ def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: fl
     peaks, _ = signal.find_peaks(over_db, height=height_db, prominence=valley_db)
     lowest = max(MAIN_LOBE + 1, math.ceil(LOWEST_HZ / spectrum.resolution_hz))
     peaks = peaks[(peaks >= lowest) & (peaks < spectrum.density.size - MAIN_LOBE - 1)]
+    excess = np.clip(spectrum.density - floor, 0.0, None)
     taken = np.zeros(spectrum.density.size, dtype=bool)
     lines = []
     for peak in peaks[np.argsort(-over_db[peaks])]:
         smear = math.ceil(2.5 * speed_scatter * peak)
         if taken[peak]:
             continue
-        reach = MAIN_LOBE + smear
+        reach = _reach(excess, int(peak), MAIN_LOBE + smear, float(floor[peak]) / math.sqrt(spectrum.averages))
         line = _measure(spectrum, floor, int(peak), reach)
         if line is not None and line.prominence_db >= prominence_db:
             lines.append(line)

@@ -68,12 +68,30 @@ class ConditionLevels:
     runs: tuple[RunLevel, ...]
     train_speed_km_h: Mapping[str, float | None]
 
+    def spread_db(self, condition: str, channels: Sequence[str]) -> float | None:
+        """Return the largest difference of a channel's level between the runs of a condition, or None of one run."""
+        spreads = []
+        for channel in channels:
+            held = [row.level_db for row in self.runs if (row.condition, row.channel) == (condition, channel)]
+            known = [level for level in held if level is not None]
+            if len(known) > 1:
+                spreads.append(max(known) - min(known))
+        return max(spreads, default=None)
 
-def condition_levels(runs: Sequence[MeasuredRun]) -> ConditionLevels:
+
+def condition_levels(
+    runs: Sequence[MeasuredRun], train_speeds_km_h: Mapping[str, float] | None = None
+) -> ConditionLevels:
     """Return the levels of the test runs, corrected for the campaign's background runs.
 
     A background run with a condition is that condition's alone, one without is
     everybody's; several are averaged in energy.
+
+    Parameters
+    ----------
+    runs : sequence of MeasuredRun
+    train_speeds_km_h : mapping of str to float, optional
+        By run, from the fleet's kinematics, where the run itself states none.
     """
     rows = []
     speeds: dict[str, list[float]] = {}
@@ -82,13 +100,17 @@ def condition_levels(runs: Sequence[MeasuredRun]) -> ConditionLevels:
             continue
         condition = run.run.condition or ""
         speeds.setdefault(condition, [])
-        if run.train_speed_km_h is not None:
-            speeds[condition].append(run.train_speed_km_h)
+        train_speed_km_h = run.train_speed_km_h
+        if train_speed_km_h is None:
+            train_speed_km_h = (train_speeds_km_h or {}).get(run.name)
+        if train_speed_km_h is not None:
+            speeds[condition].append(train_speed_km_h)
         if run.measurement is None or run.recording is None:
             continue
         background = _backgrounds(runs, run.run)
         rows += [
-            _run_level(run, run.recording[result.channel], result, background) for result in run.measurement.channels
+            _run_level(run, run.recording[result.channel], result, background, train_speed_km_h)
+            for result in run.measurement.channels
         ]
     return ConditionLevels(
         tuple(rows),
@@ -128,6 +150,7 @@ def _run_level(
     channel: Channel,
     result: ChannelResult,
     backgrounds: Mapping[str, tuple[float | None, float | None]],
+    train_speed_km_h: float | None,
 ) -> RunLevel:
     background_db, background_a_db = backgrounds.get(channel.name, (None, None))
     level = level_db(result.rms, channel.quantity) if result.usable else None
@@ -141,7 +164,7 @@ def _run_level(
     return RunLevel(
         run=run.name,
         condition=run.run.condition,
-        train_speed_km_h=run.train_speed_km_h,
+        train_speed_km_h=train_speed_km_h,
         channel=channel.name,
         component=channel.component,
         quantity=channel.quantity,

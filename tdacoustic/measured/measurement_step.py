@@ -52,11 +52,8 @@ class MeasurementSettings:
 
 def measure_run(settings: MeasurementSettings, speed: RunSpeed, survey: Survey) -> RunMeasurement:
     """Step: levels, spectra, lines and verdicts of a run from its survey."""
-    leading = speed.leading
     steady = speed.is_steady(settings.speed_tolerance)
-    scatter = 0.0
-    if leading is not None and steady and leading.mean:
-        scatter = float(np.std(leading.speed)) / abs(leading.mean)
+    scatter = speed.scatter if steady else 0.0
     verdicts = [Verdict(name, "channel", "bad", reason) for name, reason in settings.refused]
     verdicts += check_speed(speed.profiles, settings.speed_tolerance, dict(settings.stated), speed.problems)
     results = []
@@ -89,7 +86,8 @@ def _measure_channel(
         lines = find_lines(average, settings.line_prominence_db, scatter)
         families = find_families(lines, average.resolution_hz)
         floor = local_floor(average)
-    verdicts = _channel_verdicts(channel, statistics, raster.powers, average, index, lines, settings.mains_hz)
+    sought = lines if steady else None
+    verdicts = _channel_verdicts(channel, statistics, raster.powers, average, index, sought, settings.mains_hz)
     usable = all(verdict.verdict != "bad" for verdict in verdicts) and average is not None
     result = ChannelResult(
         channel=channel.name,
@@ -123,7 +121,7 @@ def _channel_verdicts(
     powers: SegmentPowers | None,
     average: Spectrum | None,
     index: int,
-    lines: Sequence[Line],
+    lines: Sequence[Line] | None,
     mains_hz: float,
 ) -> tuple[Verdict, ...]:
     if powers is None:

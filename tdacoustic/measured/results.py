@@ -38,6 +38,14 @@ class RunSpeed:
         rank = {"motor": 0, "wheelset": 1}
         return min(self.profiles, key=lambda profile: rank.get(profile.shaft or "", 2), default=None)
 
+    @property
+    def scatter(self) -> float:
+        """Relative standard deviation of the leading speed; 0 where none is known or nothing moves."""
+        leading = self.leading
+        if leading is None or leading.stands or not leading.mean:
+            return 0.0
+        return float(np.std(leading.speed)) / abs(leading.mean)
+
     def is_steady(self, tolerance: float) -> bool:
         """Whether the leading speed varies by no more than a relative tolerance, or nothing says that it does."""
         return self.leading is None or self.leading.is_constant(tolerance)

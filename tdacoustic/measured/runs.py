@@ -10,7 +10,7 @@ from tdacoustic.measured.results import RunMeasurement
 from tdacoustic.quality import Verdict
 from tdacoustic.recording import Recording
 
-__all__ = ["MeasuredRun"]
+__all__ = ["MeasuredRun", "receivers", "receivers_of"]
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,13 @@ class MeasuredRun:
 
 
 def receivers(runs: Sequence[MeasuredRun]) -> tuple[str, ...]:
+    """Return the receivers of runs that could be read, as `receivers_of` does."""
+    return receivers_of([run.recording for run in runs if run.recording is not None])
+
+
+def receivers_of(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """Return the microphones that stand for the noise: those of role receiver, else all without a role."""
-    channels = {
-        channel.name: channel for run in runs if run.recording is not None for channel in run.recording.channels
-    }
+    channels = {channel.name: channel for recording in recordings for channel in recording.channels}
     microphones = [channel for channel in channels.values() if channel.quantity == "sound_pressure"]
     chosen = [channel for channel in microphones if channel.role == "receiver"]
     return tuple(channel.name for channel in chosen or [c for c in microphones if c.role is None])

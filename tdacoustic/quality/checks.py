@@ -52,7 +52,7 @@ def check_channel(
     powers: SegmentPowers,
     averages: float,
     index: int,
-    lines: Sequence[Line],
+    lines: Sequence[Line] | None,
     mains_hz: float,
 ) -> tuple[Verdict, ...]:
     """Return one verdict a check for a signal channel.
@@ -63,17 +63,17 @@ def check_channel(
     statistics, powers : Statistics, SegmentPowers
         Of the channel's raster.
     averages : float
-        Independent averages of its spectrum.
+        Independent averages of its spectrum; 0 where no frame is without missing values.
     index : int
         Its place in them.
-    lines : sequence of Line
-        Of its averaged spectrum; empty for a run-up.
+    lines : sequence of Line or None
+        Of its averaged spectrum; None for a run-up, which is not looked at for hum.
     mains_hz : float
     """
     rms = math.sqrt(max(0.0, float(np.nan_to_num(statistics.mean_square[index]))))
     found = [
         *_log_flags(channel),
-        _missing(channel, statistics, index),
+        _missing(channel, statistics, index, averages),
         _clipping(channel, statistics, index),
         _flat(channel, statistics, index),
         _offset(channel, statistics, index, rms),
@@ -81,7 +81,7 @@ def check_channel(
         _level(channel, rms),
         _length(channel, powers, averages),
     ]
-    if lines or mains_hz:
+    if lines is not None and mains_hz:
         found.append(_hum(channel, lines, mains_hz))
     return tuple(found)
 
@@ -91,17 +91,15 @@ def _log_flags(channel: Channel) -> Iterator[Verdict]:
         yield Verdict(channel.name, "log", "warning", flag)
 
 
-def _missing(channel: Channel, statistics: Statistics, index: int) -> Verdict:
+def _missing(channel: Channel, statistics: Statistics, index: int, averages: float) -> Verdict:
     count, total = int(statistics.missing[index]), statistics.n_samples
     if count == 0:
         return Verdict(channel.name, "missing values", "ok", "none")
-    word = "bad" if count > MISSING_BAD * total else "warning"
-    return Verdict(
-        channel.name,
-        "missing values",
-        word,  # type: ignore[arg-type]
-        f"{count} of {total} samples are no numbers (NaN or infinite); frames that hold them are left out",
-    )
+    words = f"{count} of {total} samples are no numbers (NaN or infinite)"
+    if averages == 0.0:
+        return Verdict(channel.name, "missing values", "bad", f"{words}; no frame is without them")
+    words += "; frames that hold them are left out, and there are no third octaves"
+    return Verdict(channel.name, "missing values", "bad" if count > MISSING_BAD * total else "warning", words)
 
 
 def _clipping(channel: Channel, statistics: Statistics, index: int) -> Verdict:

@@ -30,13 +30,9 @@ class Covariance:
     def take(self, block: Array, whole: bool = True) -> None:
         """Add samples, shape (n_channels, n); `whole` says that all of them are finite."""
         if self._shift is None:
-            with np.errstate(invalid="ignore"):
-                mean = (
-                    block.mean(axis=1)
-                    if whole
-                    else np.nan_to_num(np.nanmean(np.where(np.isfinite(block), block, np.nan), axis=1))
-                )
-            self._shift = np.asarray(mean)
+            known = np.isfinite(block)
+            count = np.maximum(1, np.count_nonzero(known, axis=1))
+            self._shift = np.sum(block, axis=1, where=known) / count
         data = block - self._shift[:, np.newaxis]
         if whole:
             self._count += block.shape[1]

@@ -35,7 +35,9 @@ def check_speed(
     for profile in profiles:
         factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
         low, high = factor * float(profile.speed.min()), factor * float(profile.speed.max())
-        if profile.is_constant(tolerance):
+        if profile.stands:
+            found.append(Verdict(profile.channel, "speed", "ok", f"stands still ({low:.2g} to {high:.2g} {unit})"))
+        elif profile.is_constant(tolerance):
             words = f"{factor * profile.mean:.5g} {unit}, varies by {100 * profile.variation:.2g} %"
             found.append(Verdict(profile.channel, "speed", "ok", words))
         else:

@@ -22,6 +22,9 @@ FLAT_SAMPLES = 16
 PLATEAU_SAMPLES = 3
 """Identical values in a row at a record's extreme that count as clipped."""
 
+PLATEAU_OVER_NEXT = 4
+"""Samples on a plateau over those at the next value, at least: the crest of a sine in whole numbers has up to 2.4."""
+
 
 @dataclass(frozen=True)
 class Statistics:
@@ -60,24 +63,43 @@ class Statistics:
 
 
 class _Plateau:
-    """Counts runs of equal values at the extreme seen so far, on one side."""
+    """Counts runs of equal values at the extreme seen so far, on one side, and the samples at the value next to it."""
 
     def __init__(self) -> None:
-        self.extreme = -math.inf
-        self.count = 0
+        self.extreme = self.second = -math.inf
+        self._in_runs = 0
+        self._at_extreme = 0
+        self._at_second = 0
+
+    @property
+    def count(self) -> int:
+        """Samples in runs; none where the value next to the extreme is nearly as frequent: a rounded crest."""
+        return self._in_runs if self._in_runs > PLATEAU_OVER_NEXT * self._at_second else 0
 
     def take(self, values: Array, top: float) -> None:
-        if not math.isfinite(top) or top < self.extreme:
+        if not math.isfinite(top) or top < self.second:
             return
-        at_top = values == top
-        count = int(np.count_nonzero(at_top))
-        in_runs = 0
-        if count >= PLATEAU_SAMPLES:
-            edges = np.flatnonzero(np.diff(np.concatenate(([False], at_top, [False]))))
-            lengths = edges[1::2] - edges[0::2]
-            in_runs = int(lengths[lengths >= PLATEAU_SAMPLES].sum())
-        self.count = in_runs if top > self.extreme else self.count + in_runs
-        self.extreme = top
+        if top > self.extreme:
+            self.second, self._at_second = self.extreme, self._at_extreme
+            self.extreme, self._at_extreme, self._in_runs = top, 0, 0
+        if top == self.extreme:
+            at_top = values == top
+            self._at_extreme += int(np.count_nonzero(at_top))
+            self._in_runs += _in_runs(at_top)
+        below = float(np.max(values, where=values < self.extreme, initial=-math.inf))
+        if below > self.second:
+            self.second, self._at_second = below, 0
+        if math.isfinite(below) and below == self.second:
+            self._at_second += int(np.count_nonzero(values == below))
+
+
+def _in_runs(chosen: NDArray[np.bool_]) -> int:
+    """Samples in runs of at least `PLATEAU_SAMPLES`."""
+    if int(np.count_nonzero(chosen)) < PLATEAU_SAMPLES:
+        return 0
+    edges = np.flatnonzero(np.diff(np.concatenate(([False], chosen, [False]))))
+    lengths = edges[1::2] - edges[0::2]
+    return int(lengths[lengths >= PLATEAU_SAMPLES].sum())
 
 
 class _Flats:
@@ -167,7 +189,7 @@ class StatisticsMeter:
                 self._at_limits[row] += int(np.count_nonzero((values <= limits[0]) | (values >= limits[1])))
             self._flats[row].take(values)
             self._tops[row].take(values, float(high[row]))
-            if -low[row] >= self._bottoms[row].extreme:
+            if -low[row] >= self._bottoms[row].second:
                 self._bottoms[row].take(-values, -float(low[row]))
         self._squares.take(block, whole=broken.size == 0)
         self._seen += block.shape[1]

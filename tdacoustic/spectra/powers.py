@@ -76,19 +76,31 @@ class FramePowerMeter:
 
     def take(self, block: Array) -> None:
         """Add samples, shape (n_channels, n), in order."""
-        plan = self.plan
-        data = np.concatenate((self._pending, block), axis=1) if self._pending.shape[1] else block
-        start = 0
-        while self._next_frame < plan.n_frames and start + plan.frame_length <= data.shape[1]:
+        held = self._pending.shape[1]
+        # Only the frames that begin before the block need both joined; the others lie in the block itself.
+        joined = np.concatenate((self._pending, block[:, : self.plan.frame_length]), axis=1)
+        start = self._take_frames(joined, held)
+        if start < held:  # too few samples yet for the next frame
+            self._pending = np.concatenate((self._pending, block), axis=1)[:, start:]
+            return
+        start = start - held + self._take_frames(block[:, start - held :], block.shape[1])
+        self._pending = block[:, start:].copy() if self._next_frame < self.plan.n_frames else block[:, :0].copy()
+
+    def _take_frames(self, data: Array, before: int) -> int:
+        """Take the frames of `data` that begin before a sample; return where the next one begins."""
+        plan, start = self.plan, 0
+        while start < before and self._next_frame < plan.n_frames and start + plan.frame_length <= data.shape[1]:
             self._take_frame(data[:, start : start + plan.frame_length])
             start += plan.hop
-        self._pending = data[:, start:].copy() if self._next_frame < plan.n_frames else data[:, :0].copy()
+        return start if self._next_frame < plan.n_frames else max(start, before)
 
     def _take_frame(self, frames: Array) -> None:
         segment = self.plan.segment_of(self._next_frame)
         half = 0.5 * self.plan.frame_length
+        with np.errstate(invalid="ignore"):  # infinite values of both signs
+            means = frames.mean(axis=1)
         for channel, frame in enumerate(frames):
-            mean = float(frame.mean())
+            mean = float(means[channel])
             if not np.isfinite(mean):
                 continue
             np.multiply(frame, self._window, out=self._scratch)

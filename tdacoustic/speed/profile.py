@@ -11,6 +11,9 @@ __all__ = ["SpeedProfile"]
 
 Array = NDArray[np.float64]
 
+STANDSTILL = {"1/s": 0.5, "m/s": 0.3}
+"""A speed that stays below is a standstill (assumed: 30 rpm, 1 km/h); what it reads is the sensor's scatter."""
+
 
 @dataclass(frozen=True)
 class SpeedProfile:
@@ -48,8 +51,15 @@ class SpeedProfile:
         return float(np.mean(self.speed))
 
     @property
+    def stands(self) -> bool:
+        """Whether nothing moves: the 95th percentile of the speed's magnitude is that of a standstill."""
+        return float(np.percentile(np.abs(self.speed), 95.0)) < STANDSTILL.get(self.si_symbol, 0.0)
+
+    @property
     def variation(self) -> float:
-        """Relative width between the 5th and the 95th percentile."""
+        """Relative width between the 5th and the 95th percentile; 0 at a standstill."""
+        if self.stands:
+            return 0.0
         low, middle, high = np.percentile(self.speed, [5.0, 50.0, 95.0])
         return float((high - low) / abs(middle)) if middle else float("inf")
 

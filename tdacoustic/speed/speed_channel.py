@@ -37,8 +37,9 @@ class SpeedChannelMeter:
     def result(self) -> tuple[Array, Array]:
         """Return times after the first sample in s, and the mean speed around each; intervals with NaN left out."""
         means = np.concatenate(self._means) if self._means else np.zeros(0)
+        size = self._size
         if means.size == 0 and self._pending.size:
-            means = np.array([self._pending.mean()])
-        times = (np.arange(means.size, dtype=np.float64) + 0.5) * (self._size / self._rate_hz)
+            size, means = self._pending.size, np.array([self._pending.mean()])
+        times = (np.arange(means.size, dtype=np.float64) * size + 0.5 * (size - 1)) / self._rate_hz
         finite = np.isfinite(means)
         return times[finite], np.asarray(means[finite], dtype=np.float64)

@@ -56,8 +56,20 @@ class LevelFinder:
                 return 0.0, 0.0
             return float(self._pending.min()), float(self._pending.max())
         low, high = np.concatenate(self._low), np.concatenate(self._high)
-        moving = high - low > 0.5 * float(np.max(np.nan_to_num(high - low)))
+        height = high - low
+        known = np.isfinite(height)
+        if not known.any():
+            return float("nan"), float("nan")
+        low, high, height = low[known], high[known], height[known]
+        moving = height >= 0.5 * _weighted_median(height)
         return float(np.median(low[moving])), float(np.median(high[moving]))
+
+
+def _weighted_median(values: Array) -> float:
+    """Median of positive values by their own weight: neither many near zero nor one huge one decide it."""
+    ordered = np.sort(values)
+    below = np.cumsum(ordered)
+    return float(ordered[np.searchsorted(below, 0.5 * below[-1])])
 
 
 class EdgeFinder:
@@ -148,9 +160,9 @@ def clean_edges(edges: Array) -> CleanEdges:
         first = short[np.concatenate(([True], np.diff(short) > 1))]
         remove = []
         for interval in first:  # of the two edges, drop the one that leaves the evener intervals
-            keep_left = _unevenness(edges, interval + 1)
-            keep_right = _unevenness(edges, interval)
-            remove.append(interval + 1 if keep_left <= keep_right else interval)
+            start = max(0, int(interval) - 4)
+            near, at = edges[start : interval + 6], int(interval) - start
+            remove.append(interval + 1 if _unevenness(near, at + 1) <= _unevenness(near, at) else interval)
         double += len(remove)
         edges = np.delete(edges, remove)
     if edges.size <= 3:
@@ -163,9 +175,8 @@ def clean_edges(edges: Array) -> CleanEdges:
 
 
 def _unevenness(edges: Array, dropped: int) -> float:
-    """Spread of the intervals around an edge if it is dropped."""
-    near = np.delete(edges[max(0, dropped - 4) : dropped + 5], dropped - max(0, dropped - 4))
-    return float(np.std(np.diff(near)))
+    """Spread of the intervals if one edge is dropped."""
+    return float(np.std(np.diff(np.delete(edges, dropped))))
 
 
 def speed_from_edges(edges: Array, pulses_per_rev: float, duration_s: float) -> tuple[Array, Array]:

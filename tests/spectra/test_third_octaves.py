@@ -87,7 +87,9 @@ def test_the_bands_are_the_standards(conformance):
     )
 
 
-@pytest.mark.parametrize(("rate", "highest"), [(44100.0, 16000.0), (48000.0, 16000.0), (8192.0, 3150.0), (1000.0, 400.0)])
+@pytest.mark.parametrize(
+    ("rate", "highest"), [(44100.0, 16000.0), (48000.0, 16000.0), (8192.0, 3150.0), (1000.0, 400.0)]
+)
 def test_no_band_reaches_beyond_what_the_rate_holds(rate, highest):
     assert measured(np.zeros(5000), rate).nominal_hz[-1] == highest
 
@@ -123,6 +125,11 @@ def test_any_cut_into_blocks_gives_the_same_bands(cuts):
     x = np.random.default_rng(3).standard_normal((2, 6000))
     whole, pieces = measured(x, 8192.0), measured(x, 8192.0, cuts)
     assert np.allclose(pieces.mean_square, whole.mean_square, rtol=1e-10)  # rounding of sums in another order
+
+
+def test_a_last_block_of_one_sample_is_taken():
+    x = np.random.default_rng(6).standard_normal(4002)
+    assert np.allclose(measured(x, 8192.0, [4001]).mean_square, measured(x, 8192.0).mean_square, rtol=1e-10)
 
 
 def test_a_channel_with_missing_values_spoils_no_other():

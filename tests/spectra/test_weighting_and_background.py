@@ -36,8 +36,16 @@ def test_the_a_curve_falls_off_at_zero_and_at_one_kilohertz_is_zero():
 @pytest.mark.parametrize(
     ("difference", "subtract", "kind"),
     # Subtractions of textbooks (ISO 3744, 8.2.3: K1 = -10 lg(1 - 10^(-0.1 dL))), rounded to 0.1 dB.
-    [(3.0, 3.0, "marginal"), (4.0, 2.2, "marginal"), (5.0, 1.7, "marginal"), (6.0, 1.3, "applied")]
-    + [(7.0, 1.0, "applied"), (8.0, 0.7, "applied"), (9.0, 0.6, "applied"), (10.0, 0.5, "applied")],
+    [
+        (3.0, 3.0, "marginal"),
+        (4.0, 2.2, "marginal"),
+        (5.0, 1.7, "marginal"),
+        (6.0, 1.3, "applied"),
+        (7.0, 1.0, "applied"),
+        (8.0, 0.7, "applied"),
+        (9.0, 0.6, "applied"),
+        (10.0, 0.5, "applied"),
+    ],
 )
 def test_background_is_taken_off_by_energy(difference, subtract, kind, conformance):
     corrected = correct_for_background(70.0 + difference, 70.0)

@@ -1,0 +1,57 @@
+"""Harmonics are grouped; lines placed at random are not."""
+
+import numpy as np
+import pytest
+
+from tdacoustic.lines import Line, find_families
+
+
+def lines_at(rng, frequencies, error=0.02):
+    placed = sorted(frequencies)
+    return [Line(float(f + rng.normal(0.0, error)), error, 1.0, 20.0, 0.0) for f in placed]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_two_interleaved_families_are_told_apart(seed, conformance):
+    mesh, other = [174.97 * k for k in range(1, 7)], [926.0 * k for k in range(1, 4)]
+    lines = lines_at(np.random.default_rng(seed), mesh + other)
+    first, second = find_families(lines, 1.0)
+    for family, truth in ((first, mesh), (second, other)):
+        assert [number for _, number in family.members] == list(range(1, len(truth) + 1))
+        assert [lines[index].frequency_hz for index, _ in family.members] == pytest.approx(truth, abs=0.1)
+        conformance(
+            f"fundamental of {truth[0]:g} Hz",
+            truth[0],
+            family.fundamental_hz,
+            4 * 0.02 / np.sqrt(14),
+            "Hz",
+            "simulation",
+        )
+        assert family.chance < 1e-3
+
+
+@pytest.mark.parametrize("count", [5, 15, 30, 60])
+def test_random_lines_form_no_family(count):
+    found = 0
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        found += len(find_families(lines_at(rng, rng.uniform(30.0, 4000.0, count)), 1.0))
+    assert found <= 1  # 0.1 expected at the stated chance
+
+
+def test_a_family_whose_fundamental_is_missing_is_found():
+    (family,) = find_families(lines_at(np.random.default_rng(1), [80.0 * k for k in (2, 3, 4, 5, 7)]), 1.0)
+    assert family.fundamental_hz == pytest.approx(80.0, abs=0.02)
+    assert [number for _, number in family.members] == [2, 3, 4, 5, 7]
+
+
+def test_a_line_belongs_to_one_family_and_strangers_to_none():
+    lines = lines_at(np.random.default_rng(2), [100.0 * k for k in range(1, 9)] + [133.7, 257.1, 611.3])
+    families = find_families(lines, 1.0)
+    members = [index for family in families for index, _ in family.members]
+    assert len(members) == len(set(members)) == 8
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_few_lines_form_none(count):
+    assert find_families(lines_at(np.random.default_rng(3), [100.0 * k for k in range(1, count + 1)]), 1.0) == ()
