@@ -1,7 +1,25 @@
-"""Which source owns which noise line, and which dominates a condition."""
+"""Which source owns which noise line, and which dominates a condition.
 
-from tdacoustic.attribution.condition_lines import ConditionLine, lines_of_condition
+Two questions are kept apart: which body *radiates* a line (whose sensors show
+it), and what *excites* it (whose order it is).
+"""
+
 from tdacoustic.attribution.dominance import Dominance, dominance_of_condition
-from tdacoustic.attribution.sources import SourceLine, attribute
+from tdacoustic.attribution.evidence import EVIDENCE, EvidenceSettings, RunEvidence
+from tdacoustic.attribution.judgement import ConditionLine
+from tdacoustic.attribution.kinematic import RunKinematics, run_kinematics
+from tdacoustic.attribution.sources import ConditionEvidence, SourceLine, attribute
 
-__all__ = ["ConditionLine", "Dominance", "SourceLine", "attribute", "dominance_of_condition", "lines_of_condition"]
+__all__ = [
+    "EVIDENCE",
+    "ConditionEvidence",
+    "ConditionLine",
+    "Dominance",
+    "EvidenceSettings",
+    "RunEvidence",
+    "RunKinematics",
+    "SourceLine",
+    "attribute",
+    "dominance_of_condition",
+    "run_kinematics",
+]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tdacoustic.attribution import Dominance, SourceLine
+from tdacoustic.attribution import Dominance, RunKinematics, SourceLine
 from tdacoustic.campaign import Campaign
 from tdacoustic.errors import AnalysisError
+from tdacoustic.fleet import Fleet
 from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.spectra import Spectrum
@@ -48,6 +49,9 @@ class Analysis:
     inputs : tuple of LogInput
     records : tuple of (str, Record)
         Key and record of every step, upstream first.
+    fleet : Fleet or None
+    kinematics : mapping of str to RunKinematics
+        By steady run; empty without a fleet.
 
     Examples
     --------
@@ -62,6 +66,8 @@ class Analysis:
     problems: tuple[str, ...]
     inputs: tuple[LogInput, ...]
     records: tuple[tuple[str, Record], ...]
+    fleet: Fleet | None = None
+    kinematics: Mapping[str, RunKinematics] = field(default_factory=dict)
 
     def result(self, run: str, channel: str) -> ChannelResult:
         """Return spectrum, levels and lines of a channel of a run.

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from tdacoustic.attribution import Dominance, SourceLine
+from tdacoustic.attribution import Dominance, RunKinematics, SourceLine
 from tdacoustic.campaign import Campaign
 from tdacoustic.measured.levels import ConditionLevels, RunLevel
 from tdacoustic.measured.results import ChannelResult
@@ -28,6 +28,7 @@ def measured_tables(
     levels: ConditionLevels,
     sources: Sequence[SourceLine],
     dominance: Sequence[Dominance],
+    kinematics: Mapping[str, RunKinematics],
 ) -> dict[str, pd.DataFrame]:
     """Return ``quality``, ``levels``, ``bands``, ``lines``, ``sources`` and ``dominance`` as frames.
 
@@ -38,13 +39,15 @@ def measured_tables(
     levels : ConditionLevels
     sources, dominance : sequences
         Of the attribution.
+    kinematics : mapping of str to RunKinematics
+        By run; empty without a fleet.
     """
     tested = [run for run in runs if run.run.kind == "test" and run.measurement is not None]
     rows: dict[str, Iterable[Row]] = {
         "quality": _quality_rows(campaign, runs),
         "levels": _level_rows(campaign, levels),
         "bands": _band_rows(tested),
-        "lines": _line_rows(tested),
+        "lines": _line_rows(tested, kinematics),
         "sources": _source_rows(sources),
         "dominance": _dominance_rows(dominance, levels),
     }
@@ -128,10 +131,10 @@ def _quantity(run: MeasuredRun, result: ChannelResult) -> str:
     return "other" if run.recording is None else run.recording[result.channel].quantity
 
 
-def _line_rows(runs: Sequence[MeasuredRun]) -> Iterator[Row]:
+def _line_rows(runs: Sequence[MeasuredRun], kinematics: Mapping[str, RunKinematics]) -> Iterator[Row]:
     for run, result in _usable(runs):
         quantity, component = _quantity(run, result), _components(run).get(result.channel)
-        turns_hz = run.motor_speed_hz
+        turns_hz = kinematics[run.name].motor_hz if run.name in kinematics else run.motor_speed_hz
         families = {
             index: f"{family.fundamental_hz:.6g} Hz x {number}"
             for family in result.families
@@ -166,6 +169,9 @@ def _source_rows(sources: Sequence[SourceLine]) -> Iterator[Row]:
             "conflict": source.conflict,
             "confidence": source.confidence,
             "evidence": source.evidence,
+            "order_name": source.excitation_name,
+            "frequency_error_hz": source.line.frequency_error_hz,
+            "prominence_db": source.line.prominence_db,
         }
 
 
@@ -180,4 +186,7 @@ def _dominance_rows(dominance: Sequence[Dominance], levels: ConditionLevels) -> 
             "line_fraction": verdict.line_fraction,
             "dominant_excitation": verdict.dominant_excitation,
             "confidence": verdict.confidence,
+            "leading": verdict.leading,
+            "n_runs": float(verdict.n_runs),
+            "spread_db": verdict.spread_db,
         }

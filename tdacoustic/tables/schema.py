@@ -15,9 +15,10 @@ COLUMNS: Final = MappingProxyType(
         "bands": "run condition channel band_hz level_db filter_dependent",
         "lines": "run condition channel component frequency_hz frequency_error_hz level_db prominence_db order "
         "family rms",
-        "sources": "condition channel frequency_hz level_db radiator excitation source conflict confidence evidence",
+        "sources": "condition channel frequency_hz level_db radiator excitation source conflict confidence "
+        "evidence order_name frequency_error_hz prominence_db",
         "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
-        "unassigned_share line_fraction dominant_excitation confidence",
+        "unassigned_share line_fraction dominant_excitation confidence leading n_runs spread_db",
     }
 )
 """Columns by table, separated by spaces."""
@@ -27,6 +28,7 @@ TEXT_COLUMNS: Final = frozenset(
         *("run", "condition", "channel", "component", "quantity", "reference", "correction", "si_unit", "family"),
         *("check", "verdict", "detail"),
         *("radiator", "excitation", "source", "evidence", "weighting", "dominant", "dominant_excitation"),
+        *("order_name", "leading"),
     }
 )
 """Columns that hold words, even where the words are digits."""

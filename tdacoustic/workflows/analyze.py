@@ -4,31 +4,26 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
-from tdacoustic.campaign import Campaign, CampaignRun, load_campaign
-from tdacoustic.errors import TdacousticError
-from tdacoustic.steps import Store, Task, default_store_path
+from tdacoustic.campaign import Campaign, load_campaign
+from tdacoustic.errors import MissingFileError, TdacousticError
+from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
-    from tdacoustic.attribution import Dominance, SourceLine
-    from tdacoustic.ingest import Bound
+    from tdacoustic.attribution import ConditionEvidence, Dominance, RunEvidence, RunKinematics, SourceLine
+    from tdacoustic.fleet import Fleet
     from tdacoustic.measured.runs import MeasuredRun
     from tdacoustic.results import Analysis, LogInput
-    from tdacoustic.steps import LogFile, Record
+    from tdacoustic.steps import Record
+    from tdacoustic.workflows.runs import PreparedRun
 
 __all__ = ["analyze"]
 
 PARALLEL_BYTES = 100 * 2**20
 """Logs of less in all are analysed in this process: starting others would take longer."""
-
-NO_FLEET = "No fleet file: whose order a line is, is not known, so it stays unassigned."
-FLEET_UNUSED = (
-    "The campaign names a fleet file, but this version does not ascribe lines to sources yet; it stays unassigned."
-)
 
 
 def analyze(
@@ -57,157 +52,53 @@ def analyze(
     Raises
     ------
     TdacousticError
-        The campaign is wrong, or no run can be used.
+        The campaign or its fleet is wrong, or no run can be used.
     """
-    from tdacoustic.steps import lineage, result_of
+    from tdacoustic.steps import execute, lineage, result_of
+    from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
-    prepared = [_prepare(campaign, run, store) for run in campaign.runs if run.valid]
-    _check_coverage(campaign, prepared)
+    fleet, problems = _fleet(campaign)
+    prepared = prepare_runs(campaign, store)
     tasks = {item.run.name: item.task for item in prepared if item.task is not None}
-    jobs = _jobs(prepared) if jobs is None else jobs
-    failures = _execute(tasks, store, jobs, progress)
-    runs = tuple(
-        _measured(run, next((item for item in prepared if item.run is run), None), tasks, failures, store)
-        for run in campaign.runs
-    )
-    problems = [*_problems(prepared, failures), *_missing_receivers(campaign, runs), *_not_built(campaign)]
+    outcome = execute(list(tasks.values()), store, _jobs(prepared) if jobs is None else jobs, progress)
+    failures = {name: outcome.failed[task.key] for name, task in tasks.items() if task.key in outcome.failed}
+    _raise_if_all_failed(failures, len(tasks))
+    by_name = {item.run.name: item for item in prepared}
+    runs = tuple(gather_run(run, by_name.get(run.name), failures, store) for run in campaign.runs)
+    evidence: dict[str, RunEvidence] = {}
     records: dict[str, Record] = {}
     for name, task in tasks.items():
         if name not in failures:
-            result_of(task, store)
+            if by_name[name].evidence is not None:
+                evidence[name] = result_of(task, store)
             records.update(lineage(task, store))
-    inputs = _inputs(prepared)
-    return _assemble(campaign, runs, tuple(problems), inputs, tuple(records.items()))
+    problems += [*run_problems(prepared, failures), *_missing_receivers(campaign, runs), *_not_built(campaign)]
+    return _assemble(campaign, fleet, runs, evidence, (problems, log_inputs(prepared), tuple(records.items())))
 
 
-# ---------------------------------------------------------------- runs
-
-
-@dataclass(frozen=True)
-class _Prepared:
-    run: CampaignRun
-    bound: Bound | None = None
-    task: Task | None = None
-    logs: tuple[LogFile, ...] = ()
-    error: TdacousticError | None = None
-    flags: tuple[str, ...] = ()
-
-
-def _prepare(campaign: Campaign, run: CampaignRun, store: Store) -> _Prepared:
-    """Scan and hash a run's logs, bind its channels, make its task."""
-    from tdacoustic.formats import scan
-    from tdacoustic.ingest import bind_run
-    from tdacoustic.measured import FrameSettings, MeasurementSettings, measurement_task
-    from tdacoustic.steps import log_file
+def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:
+    """Load the campaign's fleet; one that is named but absent is a problem, one that is wrong an error."""
+    if campaign.fleet is None:
+        return None, []
+    from tdacoustic.fleet import load_fleet
 
     try:
-        scanned = tuple(scan(log.path) for log in run.logs)
-        bound = bind_run(campaign.channels, run, scanned)
-        logs = tuple(log_file(log.path, store) for log in run.logs)
-    except TdacousticError as error:
-        return _Prepared(run, error=error)
-    analysis = campaign.analysis
-    settings = MeasurementSettings(
-        channels=bound.recording.channels,
-        refused=tuple((refusal.channel, refusal.reason) for refusal in bound.refused),
-        line_prominence_db=analysis.line_prominence_db,
-        speed_tolerance=analysis.speed_tolerance,
-        mains_hz=analysis.mains_hz,
-        level_band_hz=analysis.level_band_hz,
-        stated=_stated_speeds(run),
-    )
-    frames = FrameSettings(analysis.frequency_resolution_hz, analysis.overlap, analysis.run_up_resolution_hz)
-    task = measurement_task(f"run {run.name}", settings, frames, logs)
-    flags = [f"{log.path.name}: {flag}" for log in scanned for flag in log.flags]
-    flags += [warning for warning in bound.warnings if not warning.startswith("channel ")]
-    return _Prepared(run, bound, task, logs, flags=tuple(flags))
+        return load_fleet(campaign.fleet.path), []
+    except MissingFileError:
+        return None, [f"fleet file {campaign.fleet.text}: no such file; no line is ascribed to a source"]
 
 
-def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
-    stated = []
-    if run.motor_speed_rpm is not None:
-        stated.append(("motor", run.motor_speed_rpm / 60.0))
-    if run.train_speed_km_h is not None:
-        stated.append(("train", run.train_speed_km_h / 3.6))
-    return tuple(stated)
-
-
-def _check_coverage(campaign: Campaign, prepared: Sequence[_Prepared]) -> None:
-    """Raise where nothing can be used, or where a channel can be used in no run."""
-    from tdacoustic.ingest import check_coverage
-
-    if not prepared:
-        return
-    errors = [item.error for item in prepared if item.error is not None]
-    if len(errors) == len(prepared):
-        first = errors[0]
-        raise type(first)("\n".join(dict.fromkeys(str(error) for error in errors))) from first
-    check_coverage([item.bound for item in prepared if item.bound is not None], campaign.channels)
-
-
-def _jobs(prepared: Sequence[_Prepared]) -> int:
+def _jobs(prepared: Sequence[PreparedRun]) -> int:
     n_bytes = sum(log.n_bytes for item in prepared for log in item.logs)
     return 1 if n_bytes < PARALLEL_BYTES else (os.cpu_count() or 1)
 
 
-def _execute(
-    tasks: Mapping[str, Task], store: Store, jobs: int, progress: Progress | None
-) -> dict[str, TdacousticError]:
-    """Bring the tasks' results into the store; return the errors by run."""
-    from tdacoustic.steps import execute
-
-    outcome = execute(list(tasks.values()), store, jobs, progress)
-    failures = {name: outcome.failed[task.key] for name, task in tasks.items() if task.key in outcome.failed}
-    if failures and len(failures) == len(tasks):
+def _raise_if_all_failed(failures: Mapping[str, TdacousticError], n_tasks: int) -> None:
+    if failures and len(failures) == n_tasks:
         first = next(iter(failures.values()))
         raise type(first)("\n".join(dict.fromkeys(str(error) for error in failures.values()))) from first
-    return failures
-
-
-def _measured(
-    run: CampaignRun,
-    prepared: _Prepared | None,
-    tasks: Mapping[str, Task],
-    failures: Mapping[str, TdacousticError],
-    store: Store,
-) -> MeasuredRun:
-    from tdacoustic.measured.runs import MeasuredRun
-    from tdacoustic.quality import Verdict
-    from tdacoustic.steps import result_of
-
-    if prepared is None:
-        return MeasuredRun(run, None, None, (Verdict("", "run", "warning", f"rejected: {run.reject_reason}"),))
-    error = prepared.error or failures.get(run.name)
-    if error is not None or prepared.bound is None:
-        return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {_words(run, error)}"),))
-    measurement = result_of(tasks[run.name], store)
-    verdicts = [Verdict("", "log", "warning", flag) for flag in prepared.flags]
-    measured = MeasuredRun(run, prepared.bound.recording, measurement, tuple(verdicts))
-    if not measured.usable_channels:
-        unusable = Verdict("", "run", "bad", "cannot be used: no signal channel is in order")
-        measured = replace(measured, verdicts=(*verdicts, unusable))
-    return measured
-
-
-def _words(run: CampaignRun, error: TdacousticError | None) -> str:
-    """Return an error with the run's logs as the campaign writes them: a copied campaign gives the same result."""
-    text = str(error)
-    for log in run.logs:
-        text = text.replace(str(log.path), log.text)
-    return text
-
-
-def _problems(prepared: Sequence[_Prepared], failures: Mapping[str, TdacousticError]) -> list[str]:
-    found = []
-    for item in prepared:
-        error = item.error or failures.get(item.run.name)
-        if error is not None:
-            found.append(f"run {item.run.name!r} is left out: {_words(item.run, error)}")
-        elif item.bound is not None:
-            found += [refusal.reason for refusal in item.bound.refused]
-    return found
 
 
 def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[str]:
@@ -221,8 +112,6 @@ def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[
 def _not_built(campaign: Campaign) -> list[str]:
     """What the campaign asks for and this version does not do."""
     found = []
-    if campaign.fleet is not None:
-        found.append(f"the fleet file {campaign.fleet.text} is not used by this version: no source is named")
     if campaign.analysis.orders:
         orders = ", ".join(f"{order:g}" for order in campaign.analysis.orders)
         found.append(f"orders {orders} are not cut by this version")
@@ -232,47 +121,73 @@ def _not_built(campaign: Campaign) -> list[str]:
     return found
 
 
-def _inputs(prepared: Sequence[_Prepared]) -> tuple[LogInput, ...]:
-    from tdacoustic.results import LogInput
-
-    found: dict[str, LogInput] = {}
-    for item in prepared:
-        if item.bound is not None:
-            for written, log, file in zip(item.run.logs, item.bound.recording.logs, item.logs, strict=True):
-                found[written.text] = LogInput(written.text, file.sha256, file.n_bytes, log.format)
-    return tuple(found.values())
-
-
 # ---------------------------------------------------------------- campaign
+
+Origins: TypeAlias = "tuple[list[str], tuple[LogInput, ...], tuple[tuple[str, Record], ...]]"
+"""Problems, inputs and records."""
 
 
 def _assemble(
     campaign: Campaign,
+    fleet: Fleet | None,
     runs: tuple[MeasuredRun, ...],
-    problems: tuple[str, ...],
-    inputs: tuple[LogInput, ...],
-    records: tuple[tuple[str, Record], ...],
+    evidence: Mapping[str, RunEvidence],
+    origins: Origins,
 ) -> Analysis:
     """Gather what stands above the single run: background, conditions, sources, dominance, tables."""
-    from tdacoustic.attribution import attribute, dominance_of_condition, lines_of_condition
+    from tdacoustic.attribution import ConditionEvidence, attribute, dominance_of_condition
     from tdacoustic.measured.levels import condition_levels
     from tdacoustic.measured.runs import receivers
     from tdacoustic.results import Analysis
     from tdacoustic.tables import measured_tables
 
-    levels = condition_levels(runs)
     microphones = receivers(runs)
-    why_not = NO_FLEET if campaign.fleet is None else FLEET_UNUSED
+    kinematics = _kinematics(fleet, runs)
+    levels = condition_levels(runs, {name: item.train_speed_km_h for name, item in kinematics.items()})
+    components = _components(runs)
     sources: list[SourceLine] = []
     dominance: list[Dominance] = []
     for condition in campaign.conditions():
         held = [run for run in runs if run.run.condition == condition and run.run.kind == "test"]
-        lines = [line for name in microphones for line in lines_of_condition(condition, name, held)]
-        found = attribute(lines, campaign.excludes, campaign.overrides, why_not)
+        steady = {run.name: evidence[run.name] for run in held if run.name in evidence and _is_steady(run)}
+        known = ConditionEvidence(condition, microphones, steady, kinematics, components, fleet is not None)
+        found, draws = attribute(known, campaign.excludes, campaign.overrides, _seed(known))
         sources += found
-        dominance.append(dominance_of_condition(condition, found, _receiver_energy(held, microphones)))
-    tables = measured_tables(campaign, runs, levels, sources, dominance)
-    return Analysis(campaign, runs, tuple(sources), tuple(dominance), tables, problems, inputs, records)
+        energy = _receiver_energy(held, microphones)
+        spread_db = levels.spread_db(condition, microphones)
+        dominance.append(dominance_of_condition(condition, found, draws, energy, len(steady), spread_db))
+    tables = measured_tables(campaign, runs, levels, sources, dominance, kinematics)
+    problems, inputs, records = origins
+    return Analysis(
+        campaign, runs, tuple(sources), tuple(dominance), tables, tuple(problems), inputs, records, fleet, kinematics
+    )
+
+
+def _is_steady(run: MeasuredRun) -> bool:
+    return run.measurement is not None and run.measurement.steady
+
+
+def _seed(known: ConditionEvidence) -> int:
+    """Seed of the resampling: derived from what is resampled."""
+    from tdacoustic.steps.codec import fingerprint
+
+    return int(fingerprint([known.condition, list(known.evidence.values())])[:15], 16)
+
+
+def _kinematics(fleet: Fleet | None, runs: Sequence[MeasuredRun]) -> dict[str, RunKinematics]:
+    if fleet is None:
+        return {}
+    from tdacoustic.attribution import run_kinematics
+    from tdacoustic.fleet import Kinematics
+
+    found = {run.name: run_kinematics(run, Kinematics.of(fleet, run.run.wheel_diameter_mm)) for run in runs}
+    return {name: item for name, item in found.items() if item is not None}
+
+
+def _components(runs: Sequence[MeasuredRun]) -> tuple[str, ...]:
+    """Components with an accelerometer, in the campaign's order."""
+    channels = [channel for run in runs if run.recording is not None for channel in run.recording.channels]
+    return tuple(dict.fromkeys(c.component for c in channels if c.quantity == "acceleration" and c.component))
 
 
 def _receiver_energy(runs: Sequence[MeasuredRun], microphones: Sequence[str]) -> dict[str, float]:

@@ -1,0 +1,180 @@
+"""The runs of a campaign: logs scanned, channels bound, tasks made, measurements gathered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from tdacoustic.attribution import EVIDENCE, EvidenceSettings
+from tdacoustic.campaign import Campaign, CampaignRun
+from tdacoustic.errors import TdacousticError
+from tdacoustic.formats import scan
+from tdacoustic.ingest import Bound, bind_run, check_coverage
+from tdacoustic.measured import FrameSettings, MeasurementSettings, measurement_task
+from tdacoustic.measured.runs import MeasuredRun, receivers_of
+from tdacoustic.quality import Verdict
+from tdacoustic.recording import Channel, Recording
+from tdacoustic.results import LogInput
+from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+
+__all__ = ["PreparedRun", "gather_run", "log_inputs", "prepare_runs", "run_problems"]
+
+
+@dataclass(frozen=True)
+class PreparedRun:
+    """A run before anything is computed.
+
+    Parameters
+    ----------
+    run : CampaignRun
+    bound : Bound or None
+        None where its logs cannot be read.
+    measurement, evidence : Task or None
+        Evidence only of a test run with a microphone.
+    logs : tuple of LogFile
+    error : TdacousticError or None
+        Why its logs cannot be read.
+    flags : tuple of str
+        What is odd about its logs.
+    """
+
+    run: CampaignRun
+    bound: Bound | None = None
+    measurement: Task | None = None
+    evidence: Task | None = None
+    logs: tuple[LogFile, ...] = ()
+    error: TdacousticError | None = None
+    flags: tuple[str, ...] = ()
+
+    @property
+    def task(self) -> Task | None:
+        """The last of its tasks."""
+        return self.evidence or self.measurement
+
+
+def prepare_runs(campaign: Campaign, store: Store) -> tuple[PreparedRun, ...]:
+    """Scan and hash the logs of all valid runs, bind their channels and make their tasks.
+
+    Raises
+    ------
+    TdacousticError
+        No run can be read, or a channel can be used in no run.
+    """
+    prepared = [_prepare(campaign, run, store) for run in campaign.runs if run.valid]
+    _check_coverage(campaign, prepared)
+    bound = [item.bound.recording for item in prepared if item.bound is not None]
+    microphones = receivers_of(bound)
+    return tuple(replace(item, evidence=_evidence(item, microphones)) for item in prepared)
+
+
+def _evidence(item: PreparedRun, microphones: tuple[str, ...]) -> Task | None:
+    if item.bound is None or item.measurement is None or item.run.kind != "test" or not microphones:
+        return None
+    survey = item.measurement.inputs["survey"]
+    settings = EvidenceSettings(microphones, _sensors(item.bound.recording))
+    return EVIDENCE.task(item.measurement.label, settings, survey=survey, measurement=item.measurement)
+
+
+def _sensors(recording: Recording) -> tuple[tuple[str, str], ...]:
+    """Vibration sensors and their components; a component is asked where it has an accelerometer."""
+
+    def is_sensor(channel: Channel) -> bool:
+        return channel.quantity == "acceleration" and channel.component is not None
+
+    return tuple((channel.name, str(channel.component)) for channel in recording.channels if is_sensor(channel))
+
+
+def _prepare(campaign: Campaign, run: CampaignRun, store: Store) -> PreparedRun:
+    """Scan and hash a run's logs, bind its channels, make its task."""
+    try:
+        scanned = tuple(scan(log.path) for log in run.logs)
+        bound = bind_run(campaign.channels, run, scanned)
+        logs = tuple(log_file(log.path, store) for log in run.logs)
+    except TdacousticError as error:
+        return PreparedRun(run, error=error)
+    analysis = campaign.analysis
+    settings = MeasurementSettings(
+        channels=bound.recording.channels,
+        refused=tuple((refusal.channel, refusal.reason) for refusal in bound.refused),
+        line_prominence_db=analysis.line_prominence_db,
+        speed_tolerance=analysis.speed_tolerance,
+        mains_hz=analysis.mains_hz,
+        level_band_hz=analysis.level_band_hz,
+        stated=_stated_speeds(run),
+    )
+    frames = FrameSettings(analysis.frequency_resolution_hz, analysis.overlap, analysis.run_up_resolution_hz)
+    task = measurement_task(f"run {run.name}", settings, frames, logs)
+    flags = [f"{log.path.name}: {flag}" for log in scanned for flag in log.flags]
+    flags += [warning for warning in bound.warnings if not warning.startswith("channel ")]
+    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags))
+
+
+def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
+    stated = []
+    if run.motor_speed_rpm is not None:
+        stated.append(("motor", run.motor_speed_rpm / 60.0))
+    if run.train_speed_km_h is not None:
+        stated.append(("train", run.train_speed_km_h / 3.6))
+    return tuple(stated)
+
+
+def _check_coverage(campaign: Campaign, prepared: Sequence[PreparedRun]) -> None:
+    """Raise where nothing can be used, or where a channel can be used in no run."""
+    if not prepared:
+        return
+    errors = [item.error for item in prepared if item.error is not None]
+    if len(errors) == len(prepared):
+        first = errors[0]
+        raise type(first)("\n".join(dict.fromkeys(str(error) for error in errors))) from first
+    check_coverage([item.bound for item in prepared if item.bound is not None], campaign.channels)
+
+
+def gather_run(
+    run: CampaignRun,
+    prepared: PreparedRun | None,
+    failures: Mapping[str, TdacousticError],
+    store: Store,
+) -> MeasuredRun:
+    """Return a run with its measurement, or with the reason why it has none."""
+    if prepared is None:
+        return MeasuredRun(run, None, None, (Verdict("", "run", "warning", f"rejected: {run.reject_reason}"),))
+    error = prepared.error or failures.get(run.name)
+    if error is not None or prepared.bound is None or prepared.measurement is None:
+        return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {_words(run, error)}"),))
+    measurement = result_of(prepared.measurement, store)
+    verdicts = [Verdict("", "log", "warning", flag) for flag in prepared.flags]
+    measured = MeasuredRun(run, prepared.bound.recording, measurement, tuple(verdicts))
+    if not measured.usable_channels:
+        unusable = Verdict("", "run", "bad", "cannot be used: no signal channel is in order")
+        measured = replace(measured, verdicts=(*verdicts, unusable))
+    return measured
+
+
+def _words(run: CampaignRun, error: TdacousticError | None) -> str:
+    """Return an error with the run's logs as the campaign writes them: a copied campaign gives the same result."""
+    text = str(error)
+    for log in run.logs:
+        text = text.replace(str(log.path), log.text)
+    return text
+
+
+def run_problems(prepared: Sequence[PreparedRun], failures: Mapping[str, TdacousticError]) -> list[str]:
+    """Return what of the runs could not be used, one line each."""
+    found = []
+    for item in prepared:
+        error = item.error or failures.get(item.run.name)
+        if error is not None:
+            found.append(f"run {item.run.name!r} is left out: {_words(item.run, error)}")
+        elif item.bound is not None:
+            found += [refusal.reason for refusal in item.bound.refused]
+    return found
+
+
+def log_inputs(prepared: Sequence[PreparedRun]) -> tuple[LogInput, ...]:
+    """Return the logs that were read, each once."""
+    found: dict[str, LogInput] = {}
+    for item in prepared:
+        if item.bound is not None:
+            for written, log, file in zip(item.run.logs, item.bound.recording.logs, item.logs, strict=True):
+                found[written.text] = LogInput(written.text, file.sha256, file.n_bytes, log.format)
+    return tuple(found.values())
