@@ -5,10 +5,13 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Notice
 from tdacoustic.reporting.sections.answer import answer
+from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.levels import levels
 from tdacoustic.reporting.sections.measured import measured
 from tdacoustic.reporting.sections.provenance import provenance
 from tdacoustic.reporting.sections.quality import quality
+from tdacoustic.reporting.sections.side_by_side import side_by_side
+from tdacoustic.reporting.sections.sources import sources
 from tdacoustic.reporting.sections.spectra import spectra
 from tdacoustic.reporting.sections.speed import speed
 from tdacoustic.results import Analysis
@@ -28,11 +31,14 @@ def measured_report(analysis: Analysis) -> Document:
     if campaign.origin == "synthetic":
         text = "Every number of this report comes from signals made by a program. Nothing in it was measured."
         notices.append(Notice("synthetic", text))
-    sections = [measured(analysis), quality(analysis)]
+    found = (side_by_side(analysis), sources(analysis), kinematics(analysis))
+    beside = found[0] is not None
+    sections = [section for section in found if section is not None]
+    sections += [measured(analysis), quality(analysis)]
     if len(analysis.tables["levels"]):
         sections.append(levels(analysis))
     if any(run.measurement is not None for run in analysis.runs):
-        sections.append(spectra(analysis))
+        sections.append(spectra(analysis, fold=beside))
     sections += [section for section in (speed(analysis), provenance(analysis)) if section is not None]
     n_runs = sum(run.measurement is not None for run in analysis.runs)
     return Document(

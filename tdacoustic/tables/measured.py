@@ -32,6 +32,8 @@ def measured_tables(
 ) -> dict[str, pd.DataFrame]:
     """Return ``quality``, ``levels``, ``bands``, ``lines``, ``sources`` and ``dominance`` as frames.
 
+    With a fleet also ``kinematics``: speed and mesh of each steady run, calculated and observed.
+
     Parameters
     ----------
     campaign : Campaign
@@ -51,6 +53,8 @@ def measured_tables(
         "sources": _source_rows(sources),
         "dominance": _dominance_rows(dominance, levels),
     }
+    if kinematics:
+        rows["kinematics"] = _kinematic_rows(tested, kinematics)
     return {name: _frame(name, table) for name, table in rows.items()}
 
 
@@ -153,6 +157,24 @@ def _line_rows(runs: Sequence[MeasuredRun], kinematics: Mapping[str, RunKinemati
                 "order": line.frequency_hz / turns_hz if turns_hz else None,
                 "family": families.get(index),
                 "rms": line.rms,
+            }
+
+
+def _kinematic_rows(runs: Sequence[MeasuredRun], kinematics: Mapping[str, RunKinematics]) -> Iterator[Row]:
+    for run in runs:
+        found = kinematics.get(run.name)
+        if found is not None:
+            yield {
+                "run": run.name,
+                "condition": run.run.condition,
+                "train_speed_km_h": run.run.train_speed_km_h or found.train_speed_km_h,
+                "motor_speed_rpm": 60.0 * found.motor_hz,
+                "speed_source": found.speed_source,
+                "mesh_frequency_hz": found.mesh_hz,
+                "observed_mesh_frequency_hz": found.observed_mesh_hz,
+                "observed_mesh_error_hz": found.observed_error_hz,
+                "mesh_excess": found.excess,
+                "causes": found.causes,
             }
 
 

@@ -17,6 +17,8 @@ COLUMNS: Final = MappingProxyType(
         "family rms",
         "sources": "condition channel frequency_hz level_db radiator excitation source conflict confidence "
         "evidence order_name frequency_error_hz prominence_db",
+        "kinematics": "run condition train_speed_km_h motor_speed_rpm speed_source mesh_frequency_hz "
+        "observed_mesh_frequency_hz observed_mesh_error_hz mesh_excess causes",
         "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
         "unassigned_share line_fraction dominant_excitation confidence leading n_runs spread_db",
     }
@@ -28,7 +30,7 @@ TEXT_COLUMNS: Final = frozenset(
         *("run", "condition", "channel", "component", "quantity", "reference", "correction", "si_unit", "family"),
         *("check", "verdict", "detail"),
         *("radiator", "excitation", "source", "evidence", "weighting", "dominant", "dominant_excitation"),
-        *("order_name", "leading"),
+        *("order_name", "leading", "speed_source", "causes"),
     }
 )
 """Columns that hold words, even where the words are digits."""

@@ -1,23 +1,58 @@
-"""The answer first: what was found at each speed, and what could not be done."""
+"""The answer first: who dominates at each speed, how sure that is, and what speaks against it."""
 
 from __future__ import annotations
 
 import math
 
+import numpy as np
+
+from tdacoustic.attribution import Dominance, SourceLine
+from tdacoustic.attribution.dominance import DECIDED
 from tdacoustic.measured.levels import energy_mean_db
 from tdacoustic.measured.runs import receivers
-from tdacoustic.reporting.document import Block, Notice, Sentences
-from tdacoustic.reporting.sections.words import condition_words
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Sentences, Table
+from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.sections.words import (
+    OWNER_SLOTS,
+    condition_words,
+    distinct_lines,
+    is_override,
+    joined,
+    probability_words,
+)
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
 
 __all__ = ["answer"]
 
+NAMED_LINES = 3
+MOST_OF_THE_SOUND = 0.5
+"""Line fraction below which the lines do not speak for the sound as a whole [assumed]."""
+WORTH_SAYING = 0.05
+"""Share of the lines' energy from which it is named against the verdict [assumed]."""
+SPREAD_DB = 1.0
+"""Spread of a level over runs from which it is named; the table always has it [assumed]."""
+
+EXCITATION_WORDS = {
+    "mesh": "at mesh orders",
+    "inverter": "at inverter orders",
+    "motor": "at orders of the motor shaft",
+    "wheelset": "at orders of the wheelset",
+    "unknown": "at no known order",
+}
+
+SHARE_WORDS = {"ambiguous": "belongs to either, motor or gearbox", "unassigned": "belongs to no known source"}
+
 
 def answer(analysis: Analysis) -> list[Block]:
-    """Return the summary: one sentence a condition, then what could not be done."""
+    """Return the summary: a sentence a condition, the verdicts side by side, then what could not be done."""
     sentences = [_of_condition(analysis, condition) for condition in analysis.campaign.conditions()]
     blocks: list[Block] = [Sentences(sentences)] if sentences else []
+    if analysis.fleet is not None:
+        blocks += _verdicts(analysis)
+    elif analysis.campaign.fleet is None and analysis.sources:
+        text = "No fleet file: whose order a line is, is not known, so no source is named and no verdict is given."
+        blocks.append(Notice("info", text))
     blocks += [Notice("warning", f"Not done: {problem}") for problem in analysis.problems]
     return blocks
 
@@ -25,31 +60,210 @@ def answer(analysis: Analysis) -> list[Block]:
 def _of_condition(analysis: Analysis, condition: str) -> str:
     words = condition_words(analysis, condition)
     level = _level_words(analysis, condition)
-    if not level:
-        return f"{words}: no noise level."
     runs = [run for run in analysis.runs if run.run.condition == condition and run.measurement is not None]
+    stated = "" if runs else _stated_levels(analysis, condition)
+    if stated or not level:
+        return f"{words}: {stated or 'no noise level, so no noise lines and no dominant source'}."
     if runs and all(run.measurement is not None and not run.measurement.steady for run in runs):
         return f"{words}: {level}; a run-up, so no lines and no dominant source."
     verdict = next((v for v in analysis.dominance if v.condition == condition), None)
-    strongest = sorted(
-        (source.line for source in analysis.sources if source.line.condition == condition),
-        key=lambda line: -line.mean_square,
+    held = [source for source in analysis.sources if source.line.condition == condition]
+    lines = _strongest_words(held) or ("no noise lines" if runs else "")
+    if analysis.fleet is None or verdict is None or not held:
+        parts = [f"{words}: {level}", lines]
+        if verdict is not None and verdict.line_fraction is not None and held:
+            parts.append(f"the lines carry {_percent(verdict.line_fraction)} of the sound energy")
+        if verdict is not None:
+            parts.append(f"dominant source {verdict.dominant}")
+        return "; ".join(part for part in parts if part) + "."
+    said = f"{words}: {_verdict_words(verdict)}{_fraction_words(analysis, verdict)}."
+    against = _against(analysis, verdict, held)
+    if against:
+        said += f" Against it: {'; '.join(against)}." if verdict.dominant != "undecided" else f" {_listed(against)}"
+    by_hand = _by_hand(analysis, condition, held)
+    if by_hand:
+        said += f" Set by the engineer: {'; '.join(by_hand)}."
+    return f"{said} Level {level}; {lines}."
+
+
+def _listed(parts: list[str]) -> str:
+    text = "; ".join(parts)
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _verdict_words(verdict: Dominance) -> str:
+    sure = probability_words(verdict.confidence)
+    if verdict.dominant != "undecided":
+        share = verdict.shares.get(verdict.dominant)
+        excitation = EXCITATION_WORDS.get(verdict.dominant_excitation or "", "")
+        has = [f"{_percent(share)} of their energy"] if share is not None else []
+        has += [f"mostly {excitation}"] if excitation else []
+        words = f"the {verdict.dominant} dominates the noise lines with probability {sure.replace('> ', 'above ')}"
+        return f"{words} ({', '.join(has)})" if has else words
+    if verdict.leading is None:
+        return "undecided, for no line could be given to a source"
+    if verdict.leading == "unassigned":
+        return f"undecided, for most of the lines' energy belongs to no known source (probability {sure})"
+    return f"undecided: the {verdict.leading} leads, but with probability {sure} only ({DECIDED:g} is asked for)"
+
+
+def _fraction_words(analysis: Analysis, verdict: Dominance) -> str:
+    if verdict.line_fraction is None:
+        return ""
+    part = _percent(verdict.line_fraction)
+    if verdict.line_fraction < MOST_OF_THE_SOUND:
+        left_out = any(exclude.condition == verdict.condition for exclude in analysis.campaign.excludes)
+        rest = "broadband or left out" if left_out else "broadband"
+        return f", but the lines are only {part} of the sound energy: the rest is {rest}"
+    return f"; the lines are {part} of the sound energy"
+
+
+def _against(analysis: Analysis, verdict: Dominance, held: list[SourceLine]) -> list[str]:
+    """What speaks against the verdict, or qualifies it."""
+    found = []
+    for name, share in verdict.shares.items():
+        if name != verdict.dominant and share >= WORTH_SAYING:
+            of_source = f"belongs to the {name}"
+            found.append(f"{_percent(share)} of the lines' energy {SHARE_WORDS.get(name, of_source)}")
+    lines = distinct_lines(held)
+    for radiator in dict.fromkeys(source.radiator for source in lines if source.conflict):
+        conflicts = sorted(
+            (source for source in lines if source.conflict and source.radiator == radiator),
+            key=lambda source: source.line.frequency_hz,
+        )
+        named = joined([f"{_hz(source)} ({source.excitation_name})" for source in conflicts])
+        order, shown = ("order does", "it") if len(conflicts) == 1 else ("orders do", "them")
+        found.append(
+            f"conflict at {named}, whose {order} not belong to the {radiator}, though its sensors show {shown}"
+        )
+    if lines and lines[0].excitation == "unknown":
+        found.append(f"no known order explains the strongest line, {_hz(lines[0])}")
+    if verdict.spread_db is not None and verdict.spread_db >= SPREAD_DB:
+        found.append(f"the level of the {verdict.n_runs} runs differs by up to {verdict.spread_db:.1f} dB")
+    return found
+
+
+def _by_hand(analysis: Analysis, condition: str, held: list[SourceLine]) -> list[str]:
+    """What the engineer set over the data."""
+    found = []
+    overrides = [source for source in distinct_lines(held) if is_override(source)]
+    if overrides:
+        found.append(f"the source at {joined([_hz(source) for source in overrides])}")
+    bands = [exclude.frequency_hz for exclude in analysis.campaign.excludes if exclude.condition == condition]
+    if bands:
+        found.append(f"{joined([f'{low:g} to {high:g} Hz' for low, high in bands])} left out")
+    return found
+
+
+def _hz(source: SourceLine) -> str:
+    return f"{source.line.frequency_hz:.0f} Hz"
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.0f} %" if share >= 0.01 else "under 1 %"
+
+
+def _strongest_words(held: list[SourceLine]) -> str:
+    named = [
+        f"{_hz(source)} ({level_db(math.sqrt(source.line.mean_square), 'sound_pressure'):.1f} dB)"
+        for source in distinct_lines(held)[:NAMED_LINES]
+    ]
+    return f"strongest noise lines {', '.join(named)}" if named else ""
+
+
+def _verdicts(analysis: Analysis) -> list[Block]:
+    """The verdicts in a table and as bars; nothing where no condition has lines."""
+    judged = [verdict for verdict in analysis.dominance if verdict.shares]
+    if not judged:
+        return []
+    blocks: list[Block] = [_table(analysis)]
+    method = (
+        "Shares are of the unweighted sound energy in the lines, averaged over the receivers, and not of the whole "
+        "sound: the column beside them says how much of it the lines are. P is the probability that the leading source "
+        f"is the largest when segments are resampled and cross-talk is in doubt; below {DECIDED:g} the verdict is "
+        "undecided."
     )
-    named: list[str] = []
-    for line in strongest:
-        text = f"{line.frequency_hz:.0f} Hz ({level_db(math.sqrt(line.mean_square), 'sound_pressure'):.1f} dB)"
-        if text.split(" (")[0] not in {name.split(" (")[0] for name in named}:
-            named.append(text)
-    parts = [f"{words}: {level}"]
-    if named:
-        parts.append(f"strongest noise lines {', '.join(named[:3])}")
-    elif runs:
-        parts.append("no noise lines")
-    if verdict is not None and verdict.line_fraction is not None and named:
-        parts.append(f"the lines carry {100 * verdict.line_fraction:.0f} % of the sound energy")
-    if verdict is not None:
-        parts.append(f"dominant source {verdict.dominant}")
-    return "; ".join(parts) + "."
+    if all(verdict.n_runs <= 1 for verdict in judged):
+        method += " Every condition rests on a single run, so how well it repeats is not known."
+    blocks.append(Paragraph(method))
+    categories = [f"{verdict.condition}: {verdict.dominant}" for verdict in judged]
+    bars = [
+        Bars(categories, np.array([100.0 * verdict.shares.get(name, 0.0) for verdict in judged]), name, color=slot)
+        for name, slot in OWNER_SLOTS.items()
+        if any(verdict.shares.get(name, 0.0) > 0.0 for verdict in judged)
+    ]
+    figure = Figure(
+        "source-shares",
+        "Whose the energy of the noise lines is",
+        "Below each bar the condition and its verdict. The bars fill up to 100 % of the lines, not of the sound.",
+        Axis("Condition and verdict"),
+        Axis("Share of the lines' energy", "%", limits=(0.0, 100.0)),
+        bars,
+        height=320,
+        bar_mode="stack",
+    )
+    return [*blocks, FigureBlock(figure, analysis.campaign.origin)]
+
+
+def _table(analysis: Analysis) -> Table:
+    speeds = analysis.tables["dominance"].set_index("condition")["train_speed_km_h"]
+    repeated = any(verdict.n_runs > 1 for verdict in analysis.dominance)
+    digits = 0 if all(float(speed).is_integer() for speed in speeds.dropna()) else 1
+    columns = [
+        Column("condition", "Condition"),
+        Column("train_speed_km_h", "Speed", "km/h", digits, "number"),
+        Column("dominant", "Verdict", kind="verdict"),
+        Column("confidence", "P", align="right"),
+        Column("motor_percent", "Motor", "%", 0, "number"),
+        Column("gearbox_percent", "Gearbox", "%", 0, "number"),
+        Column("ambiguous_percent", "Either", "ambiguous", 0, "number"),
+        Column("unassigned_percent", "Neither", "unassigned", 0, "number"),
+        Column("line_percent", "Lines", "% of sound", 0, "number"),
+        Column("dominant_excitation", "Excitation"),
+        *([Column("n_runs", "Runs", "", 0, "number")] if repeated else []),
+        *([Column("spread_db", "Spread", "dB", 1, "number")] if repeated else []),
+    ]
+    rows = []
+    for verdict in analysis.dominance:
+        cells: dict[str, Cell] = {
+            f"{name}_percent": None if not verdict.shares else 100.0 * verdict.shares.get(name, 0.0)
+            for name in OWNER_SLOTS
+        }
+        cells |= {
+            "condition": verdict.condition,
+            "train_speed_km_h": speeds.get(verdict.condition),
+            "dominant": verdict.dominant,
+            "confidence": _probability_cell(verdict),
+            "line_percent": None if verdict.line_fraction is None else 100.0 * verdict.line_fraction,
+            "dominant_excitation": verdict.dominant_excitation or "",
+            "n_runs": verdict.n_runs,
+            "spread_db": verdict.spread_db,
+        }
+        rows.append([cells[column.key] for column in columns])
+    return Table(
+        "dominance",
+        "Dominance by speed: shares of the lines' energy in %, and of the lines in all sound",
+        columns,
+        rows,
+        origin=analysis.campaign.origin,
+    )
+
+
+def _probability_cell(verdict: Dominance) -> str:
+    """The probability, and of what it is where that is not the verdict."""
+    leading = f" {verdict.leading}" if verdict.dominant == "undecided" and verdict.leading is not None else ""
+    return probability_words(verdict.confidence) + leading
+
+
+def _stated_levels(analysis: Analysis, condition: str) -> str:
+    """Levels that the campaign states, for a condition without recordings."""
+    words = []
+    for level in analysis.campaign.levels:
+        if level.condition == condition:
+            unit = "dB" if level.weighting == "Z" else f"dB({level.weighting})"
+            where = "" if level.distance_m is None else f" at {level.distance_m:g} m"
+            words.append(f"{level.level_db:.1f} {unit} re 20 µPa{where} ({level.origin or 'origin not stated'})")
+    return f"{joined(words)}, stated and not recorded, so no lines and no dominant source" if words else ""
 
 
 def _level_words(analysis: Analysis, condition: str) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tdacoustic.recording import Channel
-from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Table
+from tdacoustic.reporting.document import Block, Column, Facts, Section, Table
 from tdacoustic.reporting.sections.words import pretty_unit, speed_words
 from tdacoustic.results import Analysis
 
@@ -21,7 +21,6 @@ def measured(analysis: Analysis) -> Section:
         blocks.append(_channels(analysis))
     if analysis.campaign.levels:
         blocks.append(_known_levels(analysis))
-    blocks += _judgements(analysis)
     return Section("measured", "What was measured", blocks)
 
 
@@ -110,26 +109,3 @@ def _known_levels(analysis: Analysis) -> Table:
         Column("origin", "Origin"),
     )
     return Table("known-levels", "Levels known without logs", columns, rows, origin="printed")
-
-
-def _judgements(analysis: Analysis) -> list[Block]:
-    campaign = analysis.campaign
-    rows = [
-        ("excluded", e.condition, e.channel or "all", f"{e.frequency_hz[0]:g} to {e.frequency_hz[1]:g} Hz", e.reason)
-        for e in campaign.excludes
-    ]
-    rows += [
-        ("override", o.condition, "all", f"{o.frequency_hz:g} Hz is of the {o.source}", o.reason)
-        for o in campaign.overrides
-    ]
-    if not rows:
-        return []
-    columns = (
-        Column("kind", "Kind"),
-        Column("condition", "Condition"),
-        Column("channel", "Channel"),
-        Column("what", "What"),
-        Column("reason", "Reason"),
-    )
-    table = Table("judgements", "Exclusions and overrides by the engineer", columns, rows)
-    return [Details("Exclusions and overrides by the engineer", [table])] if len(rows) > 12 else [table]

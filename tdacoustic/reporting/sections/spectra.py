@@ -25,7 +25,7 @@ from tdacoustic.results import Analysis
 from tdacoustic.spectra import Spectrum
 from tdacoustic.units import REFERENCES, level_db, reference_label
 
-__all__ = ["single_spectrum_figure", "spectra"]
+__all__ = ["density_levels", "level_axis", "quantity_title", "single_spectrum_figure", "spectra"]
 
 TRACES = 4
 """Channels drawn in one figure."""
@@ -36,15 +36,17 @@ LOWEST_HZ = 10.0
 _TITLES = {"sound_pressure": "Sound pressure", "acceleration": "Acceleration"}
 
 
-def spectra(analysis: Analysis) -> Section:
-    """Return the section on spectra and lines."""
+def spectra(analysis: Analysis, fold: bool = False) -> Section:
+    """Return the section on spectra and lines, each run folded away where another section shows what matters."""
     blocks: list[Block] = []
     for run in tested_runs(analysis):
         figures = _run_figures(analysis, run)
         if figures:
             table = _line_table(analysis, run)
             parts: list[Block] = [*figures, *([table] if table is not None else [])]
-            blocks.append(Section(slug("run", run.name), f"Run {run.name}: {speed_words(run)}", parts))
+            title = f"Run {run.name}: {speed_words(run)}"
+            folded = Details(f"{title}: all channels and lines", parts)
+            blocks.append(folded if fold else Section(slug("run", run.name), title, parts))
     if not blocks:
         blocks = [Paragraph("No channel gave a spectrum.")]
     method = (
@@ -80,7 +82,7 @@ def single_spectrum_figure(spectrum: Spectrum, lines: Sequence[SpectralLine] = (
     elements: list[Element] = [
         Line(
             spectrum.frequencies_hz[first:],
-            _levels(spectrum, spectrum.density)[first:],
+            density_levels(spectrum, spectrum.density)[first:],
             spectrum.name,
             color=0,
             width=1.0,
@@ -92,14 +94,15 @@ def single_spectrum_figure(spectrum: Spectrum, lines: Sequence[SpectralLine] = (
         f"Spectrum of {spectrum.name}",
         f"Line spacing {spectrum.resolution_hz:.4g} Hz. " + _interval_words(spectrum),
         Axis("Frequency", "Hz", "log"),
-        _level_axis(spectrum),
+        level_axis(spectrum),
         elements,
     )
 
 
-def _level_axis(spectrum: Spectrum) -> Axis:
+def level_axis(spectrum: Spectrum) -> Axis:
+    """Return the axis of a spectrum: level re its reference, else the quantity itself."""
     reference = pretty_unit(reference_label(spectrum.quantity) or "") or None
-    title = _title(spectrum.quantity)
+    title = quantity_title(spectrum.quantity)
     note = f"rms in {spectrum.noise_bandwidth_hz:.3g} Hz"
     if reference is None:
         return Axis(title, pretty_unit(spectrum.si_symbol), "log", note=note)
@@ -114,11 +117,12 @@ def _interval_words(spectrum: Spectrum) -> str:
     ).replace("-", "\N{MINUS SIGN}")
 
 
-def _title(quantity: str) -> str:
+def quantity_title(quantity: str) -> str:
+    """Name of a quantity as an axis has it."""
     return _TITLES.get(quantity, quantity.replace("_", " ").capitalize())
 
 
-def _levels(spectrum: Spectrum, density: np.ndarray) -> np.ndarray:
+def density_levels(spectrum: Spectrum, density: np.ndarray) -> np.ndarray:
     """Level (or rms, where the quantity has no level) of a density in one noise bandwidth."""
     power = density * spectrum.noise_bandwidth_hz
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -137,20 +141,20 @@ def _spectrum_figure(
         first = max(1, math.ceil(LOWEST_HZ / spectrum.resolution_hz))
         frequencies = spectrum.frequencies_hz[first:]
         elements.append(
-            Line(frequencies, _levels(spectrum, spectrum.density)[first:], channel.name, color=slot, width=1.0)
+            Line(frequencies, density_levels(spectrum, spectrum.density)[first:], channel.name, color=slot, width=1.0)
         )
         if result.floor is not None and len(held) == 1:
-            floor = _levels(spectrum, result.floor)[first:]
+            floor = density_levels(spectrum, result.floor)[first:]
             elements.append(Line(frequencies, floor, "local floor", style="dotted", color=slot, opacity=0.7))
         elements += _line_markers(channel.name, quantity, result.lines, slot, named[slot], run.motor_speed_hz)
     spectrum = held[0][2]
     return Figure(
         slug("spectrum", run.name, quantity) + part,
-        f"{_title(quantity)}, {condition_words(analysis, run.run.condition or '')}, run {run.name}{part}",
+        f"{quantity_title(quantity)}, {condition_words(analysis, run.run.condition or '')}, run {run.name}{part}",
         f"Line spacing {spectrum.resolution_hz:.4g} Hz. Points are the lines found; the most prominent are named. "
         + _interval_words(spectrum),
         Axis("Frequency", "Hz", "log"),
-        _level_axis(spectrum),
+        level_axis(spectrum),
         elements,
         height=440,
     )

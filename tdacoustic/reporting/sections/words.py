@@ -4,14 +4,38 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
+from tdacoustic.attribution import SourceLine
 from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
 from tdacoustic.results import Analysis
 
-__all__ = ["condition_words", "measured_channels", "pretty_unit", "slug", "speed_words", "tested_runs"]
+__all__ = [
+    "OWNER_SLOTS",
+    "OWNER_SLOT_OTHER",
+    "by_frequency",
+    "condition_words",
+    "distinct_lines",
+    "is_override",
+    "joined",
+    "measured_channels",
+    "pretty_signs",
+    "pretty_unit",
+    "probability_words",
+    "same_line",
+    "slug",
+    "speed_words",
+    "tested_runs",
+]
+
+OWNER_SLOTS = {"motor": 0, "gearbox": 1, "ambiguous": 3, "unassigned": 7}
+"""Colour of a source, the same in every figure."""
+OWNER_SLOT_OTHER = 2
+
+SAME_LINE = 0.003
+"""Relative distance within which two receivers' lines are named once in a sentence."""
 
 
 def slug(*parts: str) -> str:
@@ -52,7 +76,7 @@ def speed_words(run: MeasuredRun) -> str:
     if run.train_speed_km_h is not None:
         words.append(f"{run.train_speed_km_h:.4g} km/h")
     if run.motor_speed_hz is not None:
-        words.append(f"motor {60.0 * run.motor_speed_hz:.5g} rpm")
+        words.append(f"motor {60.0 * run.motor_speed_hz:.4g} rpm")
     if run.measurement is not None and not run.measurement.steady:
         profile = run.measurement.speed.leading
         if profile is not None:
@@ -79,3 +103,70 @@ def measured_channels(run: MeasuredRun) -> Iterator[tuple[Channel, ChannelResult
         for result in run.measurement.channels:
             if result.usable and math.isfinite(result.rms):
                 yield run.recording[result.channel], result
+
+
+def probability_words(probability: float | None) -> str:
+    """Return a probability from resampling, which is never exactly 0 or 1.
+
+    Examples
+    --------
+    >>> probability_words(1.0), probability_words(0.916), probability_words(None)
+    ('> 0.99', '0.92', '')
+    """
+    if probability is None:
+        return ""
+    if probability > 0.994:
+        return "> 0.99"
+    return "< 0.01" if probability < 0.01 else f"{probability:.2f}"
+
+
+def pretty_signs(text: str) -> str:
+    """Return a text with true minus signs before its numbers.
+
+    Examples
+    --------
+    >>> pretty_signs("gearbox -1 dB") == "gearbox \N{MINUS SIGN}1 dB"
+    True
+    """
+    return re.sub(r"(?<![\w-])-(?=\d)", "\N{MINUS SIGN}", text)
+
+
+def joined(words: Sequence[str]) -> str:
+    """Join words as in a sentence.
+
+    Examples
+    --------
+    >>> joined(["a", "b", "c"]), joined(["a"])
+    ('a, b and c', 'a')
+    """
+    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+
+
+def distinct_lines(sources: Iterable[SourceLine]) -> list[SourceLine]:
+    """Noise lines, loudest first, those of several receivers at one frequency once."""
+    found: list[SourceLine] = []
+    for source in sorted(sources, key=lambda item: -item.line.mean_square):
+        if not any(same_line(source, other) for other in found):
+            found.append(source)
+    return found
+
+
+def same_line(one: SourceLine, other: SourceLine) -> bool:
+    """Whether two receivers' lines are at one frequency, for the words of a report."""
+    return abs(one.line.frequency_hz - other.line.frequency_hz) <= SAME_LINE * one.line.frequency_hz
+
+
+def by_frequency(sources: Iterable[SourceLine]) -> list[SourceLine]:
+    """Lines by frequency, those of several receivers at one frequency by receiver."""
+    groups: list[list[SourceLine]] = []
+    for source in sorted(sources, key=lambda item: item.line.frequency_hz):
+        if groups and same_line(source, groups[-1][0]):
+            groups[-1].append(source)
+        else:
+            groups.append([source])
+    return [source for group in groups for source in sorted(group, key=lambda item: item.line.channel)]
+
+
+def is_override(source: SourceLine) -> bool:
+    """Whether the engineer's word stands for the source of a line."""
+    return source.evidence.startswith("Override")

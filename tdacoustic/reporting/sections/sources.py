@@ -1,0 +1,177 @@
+"""Every noise line with its source and the evidence for it, as the paper's Table 2 has them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+
+from tdacoustic.attribution import SourceLine
+from tdacoustic.measured.runs import receivers
+from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.sections.words import (
+    by_frequency,
+    condition_words,
+    is_override,
+    joined,
+    pretty_signs,
+    probability_words,
+    same_line,
+    slug,
+)
+from tdacoustic.results import Analysis
+from tdacoustic.units import level_db
+
+__all__ = ["sources"]
+
+METHOD = (
+    "Two questions are kept apart: which body radiates a line (whose sensors show it over their own local floor) and "
+    "what excites it (whose order it is). The source follows the sensors; where both components' sensors or none show "
+    "the line, the order decides; where neither does, it stays ambiguous or unassigned. A conflict means that the "
+    "sensors and the order speak for different components. The columns Motor and Gearbox are the prominence in that "
+    "component's best sensor; a dash stands where the line leaves no trace. "
+    "P is the probability that the line is of this source, when segments are resampled; 'set' "
+    "where the engineer has set it."
+)
+IN_SIGHT = 8
+"""Sentences of evidence that are not folded away."""
+NO_LINES = "No noise line was found in a steady run, so there is nothing to ascribe."
+
+
+def sources(analysis: Analysis) -> Section | None:
+    """Return the section on the sources, or None where there is nothing to ascribe: no fleet or no microphone."""
+    campaign = analysis.campaign
+    asked = analysis.fleet is not None and receivers(analysis.runs)
+    if not asked and not campaign.excludes and not campaign.overrides:
+        return None
+    blocks: list[Block] = [Paragraph(METHOD if analysis.sources else NO_LINES)]
+    for condition in campaign.conditions():
+        held = [source for source in analysis.sources if source.line.condition == condition]
+        if held:
+            blocks += [_table(analysis, condition, held), _evidence(held)]
+    blocks += _overrides(analysis) + _excludes(analysis)
+    return Section("sources", "Sources of the noise lines", blocks)
+
+
+def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Table:
+    components = _components(analysis)
+    marked = any(source.conflict or is_override(source) for source in held)
+    several = len({source.line.channel for source in analysis.sources}) > 1
+    columns = [
+        Column("frequency_hz", "Line", "Hz", 1, "number"),
+        *([Column("channel", "Receiver")] if several else []),
+        Column("level_db", "Level", "dB", 1, "number"),
+        *(Column(f"{slug(name)}_prominence_db", name.capitalize(), "dB", 0, "number") for name in components),
+        Column("radiator", "Radiator"),
+        Column("excitation", "Excitation"),
+        Column("source", "Source", kind="verdict"),
+        *([Column("mark", "Mark", kind="verdict")] if marked else []),
+        Column("confidence", "P", align="right"),
+    ]
+    rows = []
+    for source in by_frequency(held):
+        prominence = source.line.component_prominence_db()
+        cells: dict[str, Cell] = {
+            f"{slug(name)}_prominence_db": prominence.get(name) for name in components
+        }  # minus infinity, no trace, is shown as a dash
+        marks = [word for word, true in (("conflict", source.conflict), ("override", is_override(source))) if true]
+        cells |= {
+            "frequency_hz": source.line.frequency_hz,
+            "channel": source.line.channel,
+            "level_db": level_db(math.sqrt(source.line.mean_square), "sound_pressure"),
+            "radiator": source.radiator or "not asked",
+            "excitation": _excitation_words(source),
+            "source": source.source,
+            "mark": ", ".join(marks),
+            "confidence": "set" if is_override(source) else probability_words(source.confidence),
+        }
+        rows.append([cells[column.key] for column in columns])
+    title = f"Noise lines, {condition_words(analysis, condition)}"
+    verdict = next((v.dominant for v in analysis.dominance if v.condition == condition), None)
+    if verdict is not None and analysis.fleet is not None:
+        title += f": {verdict}"
+    return Table(slug("sources", condition), title, columns, rows, origin=analysis.campaign.origin)
+
+
+def _evidence(held: Sequence[SourceLine]) -> Block:
+    """The evidence as a sentence a line, receivers of whom the same is true together; folded away where it is long."""
+    groups: list[tuple[SourceLine, list[str]]] = []
+    for source in by_frequency(held):
+        if groups and same_line(source, groups[-1][0]) and _words(source) == _words(groups[-1][0]):
+            groups[-1][1].append(source.line.channel)
+        else:
+            groups.append((source, [source.line.channel]))
+    several = len({source.line.channel for source in held}) > 1
+    sentences = Sentences(
+        [
+            f"{first.line.frequency_hz:.1f} Hz{f' at {joined(who)}' if several else ''}: {_words(first)}"
+            for first, who in groups
+        ]
+    )
+    n_lines = len(sentences.items)
+    return sentences if n_lines <= IN_SIGHT else Details(f"Evidence, {n_lines} sentences", [sentences])
+
+
+def _words(source: SourceLine) -> str:
+    return pretty_signs(re.sub(r"\([+-]0\.0 Hz\)", "(0.0 Hz off)", source.evidence))
+
+
+def _components(analysis: Analysis) -> list[str]:
+    """Components whose sensors were asked, motor and gearbox first."""
+    found = {view.component for source in analysis.sources for view in source.line.views()}
+    first = [name for name in ("motor", "gearbox") if name in found]
+    return first + sorted(found - set(first))
+
+
+def _excitation_words(source: SourceLine) -> str:
+    if source.excitation_name is None:
+        return source.excitation
+    return source.excitation_name
+
+
+def _overrides(analysis: Analysis) -> list[Block]:
+    rows = []
+    for override in analysis.campaign.overrides:
+        struck = [
+            f"{source.line.frequency_hz:.1f} Hz at {source.line.channel}"
+            for source in analysis.sources
+            if source.line.condition == override.condition
+            and is_override(source)
+            and override.reason in source.evidence
+            and source.source == override.source
+        ]
+        effect = joined(struck) if struck else "no such noise line was found"
+        rows.append((override.condition, override.frequency_hz, override.source, override.reason, effect))
+    columns = (
+        Column("condition", "Condition"),
+        Column("frequency_hz", "Line", "Hz", None, "number"),
+        Column("source", "Source", kind="verdict"),
+        Column("reason", "Reason"),
+        Column("lines", "Lines it was given to"),
+    )
+    return [Table("overrides", "Overrides by the engineer", columns, rows)] if rows else []
+
+
+def _excludes(analysis: Analysis) -> list[Block]:
+    table = analysis.tables["lines"]
+    table = table[table["component"].isna() | ~table["component"].isin(["motor", "gearbox"])]
+    microphones = {channel.name for channel in analysis.campaign.channels if channel.role in (None, "receiver")}
+    rows = []
+    for exclude in analysis.campaign.excludes:
+        low, high = exclude.frequency_hz
+        inside = table[(table["condition"] == exclude.condition) & table["frequency_hz"].between(low, high)]
+        inside = inside[inside["channel"].isin(microphones if exclude.channel is None else [exclude.channel])]
+        lines = [
+            f"{row['frequency_hz']:.1f} Hz at {row['channel']}, {row['level_db']:.1f} dB"
+            for row in inside.to_dict("records")
+        ]
+        effect = "; ".join(dict.fromkeys(lines)) or "no noise line lies in it"
+        rows.append((exclude.condition, exclude.channel or "all", f"{low:g} to {high:g}", exclude.reason, effect))
+    columns = (
+        Column("condition", "Condition"),
+        Column("channel", "Channel"),
+        Column("frequency_hz", "Band", "Hz"),
+        Column("reason", "Reason"),
+        Column("lines", "Noise lines left out"),
+    )
+    return [Table("exclusions", "Exclusions by the engineer", columns, rows)] if rows else []
