@@ -134,7 +134,9 @@ class _Window:
     def view(self, line: Line, scatter: float) -> View:
         resolution_hz = self._spectrum.resolution_hz
         peak = round(line.frequency_hz / resolution_hz)
-        reach = MAIN_LOBE + math.ceil(2.5 * scatter * peak)
+        # A steady line fills one lobe, one that the speed smears what the speed or, unknown, its own width says.
+        moving_hz = max(scatter * line.frequency_hz, 0.0 if scatter > 0.0 else line.width_hz) if line.width_hz else 0.0
+        reach = MAIN_LOBE + math.ceil(2.5 * moving_hz / resolution_hz)
         low, high = max(1, peak - reach), min(self._floor.size, peak + reach + 1)
         lobe = self._density[:, low:high].sum(axis=1, dtype=np.float64) - self._floor[low:high].sum()
         return View(
@@ -146,4 +148,4 @@ class _Window:
         )
 
 
-EVIDENCE = Step("evidence", 1, gather_evidence, "Sensors at the noise lines")
+EVIDENCE = Step("evidence", 2, gather_evidence, "Sensors at the noise lines")

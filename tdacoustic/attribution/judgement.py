@@ -194,6 +194,9 @@ MARGIN_SCATTER_DB = 3.0
 """Standard deviation of what is not known of floors and paths: it moves all lines' margins of a condition together."""
 LINE_SCATTER_DB = 2.0
 """The same, for each line by itself."""
+RECEIVER_SCATTER_DB = 1.0
+"""Standard deviation of a line's level at one receiver against the same source a step aside: interference of paths,
+ground, position. Without it two equal sources would be told apart by a hundredth of a decibel."""
 CONFLICT_DOUBT = 0.25
 """How often the order is right where one component's sensors contradict it."""
 
@@ -203,8 +206,9 @@ def draw(lines: Sequence[JudgedLine], components: Sequence[str], seed: int) -> D
 
     Segments of a run are resampled together over all its channels. Each draw
     shifts the prominence of one component against the others by what is not
-    known of floors and paths. An ambiguous line goes to either component in
-    turn; a line in conflict follows its order now and then.
+    known of floors and paths. An ambiguous line goes to the component that then
+    shows it better: equal prominence gives either in turn; a line in conflict
+    follows its order now and then.
 
     Parameters
     ----------
@@ -227,9 +231,9 @@ def draw(lines: Sequence[JudgedLine], components: Sequence[str], seed: int) -> D
             if level is not None:
                 own = rng.normal(0.0, LINE_SCATTER_DB / math.sqrt(2.0), DRAWS)
                 prominence[component] = level + shift[component] + own
-        energy[index] = _energy_draws(judged.line, weights)
-        doubt, coin = rng.random(DRAWS), rng.random(DRAWS)
-        source[index] = _source_draws(judged, prominence, names, doubt, coin)
+        path_db = rng.normal(0.0, RECEIVER_SCATTER_DB, DRAWS)
+        energy[index] = _energy_draws(judged.line, weights) * 10.0 ** (0.1 * path_db)
+        source[index] = _source_draws(judged, prominence, names, rng.random(DRAWS))
     return Draws(names, source, energy)
 
 
@@ -269,19 +273,17 @@ def _energy_draws(line: ConditionLine, weights: dict[str, Array]) -> Array:
 
 
 def _source_draws(
-    judged: JudgedLine, prominence: dict[str, Array], names: tuple[str, ...], doubt: Array, coin: Array
+    judged: JudgedLine, prominence: dict[str, Array], names: tuple[str, ...], doubt: Array
 ) -> NDArray[np.int64]:
     kind = None if judged.match is None else judged.match.expected.kind
     found = np.empty(DRAWS, dtype=np.int64)
-    pair = ("motor", "gearbox")
     for at in range(DRAWS):
-        radiator = (
-            radiator_of({component: float(level[at]) for component, level in prominence.items()}) if prominence else ""
-        )
+        levels = {component: float(level[at]) for component, level in prominence.items()}
+        radiator = radiator_of(levels) if levels else ""
         source, conflict = source_by_rule(radiator, kind)
         if conflict and doubt[at] < CONFLICT_DOUBT and kind is not None:
             source = COMPONENT_OF_KIND[kind]
         if source == "ambiguous":
-            source = pair[int(coin[at] < 0.5)]
+            source = max(levels, key=lambda component: levels[component])
         found[at] = names.index(source) if source in names else names.index("unassigned")
     return found

@@ -30,11 +30,23 @@ FREQUENCY_VARIANCE = (0.096, 1.03)
 """Variance of the interpolated frequency, in lines², is ``(a / s + b / s²) / averages`` with s the power over
 the floor: fitted to simulations at 50 % overlap, s from 4 to 10000; a test holds it."""
 
-
-BROAD = 0.2
+BROAD = 0.1
 """A peak whose neighbours beyond its main lobe hold more than this part of its power is broad."""
 WIDEST = 64
 """Half width at which a broad peak is no longer widened, in lines of the spectrum."""
+SHOULDER = 12
+"""Width of the floor beside a peak that it must stand over, at least, in lines of the spectrum."""
+BUMP_SIGMAS, BLIND_BUMP_SIGMAS = 3.8, 4.4
+"""Standard deviations by which a smeared line stands over the bands beside it: about `FALSE_ALARMS` a spectrum; more
+where its width is not known."""
+WIDEST_SMEAR = 0.0125
+"""Half width within which a smear is sought where the speed is not known: 2.5 times 0.5 % [assumed]."""
+STRONG_DB = 10.0
+"""Height of lines that tell their smear."""
+GUARD = 2.5
+"""Width beside a line in which no smeared line is sought, in smears."""
+UNKNOWN_SCATTER = (0.0015, 0.004)
+"""Relative smears at which lines are sought where nothing says how much the speed moved [assumed]."""
 
 
 @dataclass(frozen=True)
@@ -122,13 +134,118 @@ def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int) -> Line | 
     )
 
 
+def _is_smeared(excess: Array, scatter: Array, peak: int, smear: int) -> bool:
+    """Whether a peak of a run with a moving speed is broader than a window's lobe: most of its power lies beyond."""
+    low, high = max(1, peak - MAIN_LOBE - smear), min(excess.size, peak + MAIN_LOBE + smear + 1)
+    lobe = float(excess[peak - MAIN_LOBE : peak + MAIN_LOBE + 1].sum())
+    whole = float(excess[low:high].sum())
+    doubt = 1.4 * float(np.sqrt(np.sum(scatter[low:high] ** 2)))
+    return whole - lobe > max(0.2 * whole, 2.0 * doubt)
+
+
+def _recentred(excess: Array, peak: int, smear: int) -> int:
+    """Centre of a smeared line; its highest peak may stand at its edge, where the speed turned."""
+    centre = peak
+    for _ in range(6):
+        low, high = max(1, centre - smear), min(excess.size, centre + smear + 1)
+        weights = np.clip(excess[low:high], 0.0, None)
+        moved = round(float(np.arange(low, high) @ weights / weights.sum())) if weights.sum() > 0.0 else centre
+        if moved == centre:
+            break
+        centre = moved
+    return centre
+
+
+def _smear_of_lines(difference: Array, over_db: Array, peaks: NDArray[np.int64]) -> float:
+    """Relative smear that several strong lines share; 0 where they do not: then nothing tells smear from neighbours."""
+    found, seen = [], np.zeros(difference.size, dtype=bool)
+    for peak in map(int, peaks[np.argsort(-over_db[peaks])]):
+        half = math.ceil(WIDEST_SMEAR * peak)
+        low, high = max(1, peak - half), min(difference.size, peak + half + 1)
+        if over_db[peak] < STRONG_DB or seen[peak] or half <= 2 * MAIN_LOBE:
+            continue
+        seen[low:high] = True
+        centre = _recentred(difference, peak, half)
+        low, high = max(1, centre - half), min(difference.size, centre + half + 1)
+        seen[low:high] = True
+        weights = np.clip(difference[low:high], 0.0, None)
+        weights[weights < 0.02 * weights.max()] = 0.0
+        moment = float((np.arange(low, high) - centre) ** 2 @ weights / weights.sum()) - HANN_SECOND_MOMENT
+        lobe = float(weights[max(0, peak - MAIN_LOBE - low) : peak + MAIN_LOBE + 1 - low].sum() / weights.sum())
+        if abs(centre - peak) <= half and lobe < 0.8 and moment > 1.0:
+            found.append(math.sqrt(moment) / centre)
+    if len(found) < 2:
+        return 0.0
+    middle = float(np.median(found))
+    shared = [value for value in found if middle / 1.6 <= value <= 1.6 * middle]
+    return float(np.median(shared)) if len(shared) >= 2 else 0.0
+
+
+def _guarded(taken: NDArray[np.bool_], density: Array, floor: Array, relative: float) -> NDArray[np.bool_]:
+    """Lines with what lies beside them: twice the smear, and skirts until these reach the floor."""
+    guarded = taken.copy()
+    edges = np.flatnonzero(np.diff(taken.astype(np.int8)))
+    for edge in map(int, edges):
+        side = -1 if taken[edge + 1] else 1
+        far = max(SHOULDER // 2, math.ceil(GUARD * relative * edge))
+        end = edge + side * far
+        while 0 < end < density.size - 4 and np.median(density[end - 3 : end + 4] / floor[end - 3 : end + 4]) > 2.0:
+            end += side
+        low, high = sorted((edge, end))
+        guarded[max(0, low) : high + 1] = True
+    return guarded
+
+
+def _broad_bumps(
+    spectrum: Spectrum, floor: Array, taken: NDArray[np.bool_], relative: float, least_sigmas: float
+) -> list[tuple[int, int]]:
+    """Places and half widths where a band of a smeared line's width stands over the bands beside it, the surest first.
+
+    A line that follows a moving speed may stand nowhere above the scatter of single lines, and yet
+    clearly above it in the sum over its width.
+    """
+    n = floor.size
+    at = np.arange(n)
+    half = np.ceil(1.5 * relative * at).astype(int)
+    low, high = at - half, at + half + 1
+    side = 2 * np.maximum(half, SHOULDER // 2)
+    reach = half + side
+    usable = (half >= MAIN_LOBE) & (at - reach > 0) & (at + reach + 1 < n) & (at * spectrum.resolution_hz > LOWEST_HZ)
+    places = at[usable]
+    if places.size == 0:
+        return []
+    ratio = np.where(taken, 1.0, spectrum.density / floor)
+    total = np.concatenate(([0.0], np.cumsum(ratio)))
+    flat = np.concatenate(([0.0], np.cumsum(np.minimum(ratio, 3.0))))
+    low, high, reach, half, side = low[usable], high[usable], reach[usable], half[usable], side[usable]
+    left = (flat[low] - flat[places - reach]) / (low - places + reach)
+    right = (flat[places + reach + 1] - flat[high]) / (places + reach + 1 - high)
+    beside = np.maximum(1.0, 0.5 * (left + right))
+    core = high - low
+    # Neighbouring lines of a Hann window are correlated: the variance of a sum is 1.94 times that of independent ones.
+    scatter = beside * np.sqrt(1.94 * core * (1.0 + core / (2.0 * side)) / spectrum.averages)
+    sure = (total[high] - total[low] - core * beside) / scatter
+    blocked = np.concatenate(([0], np.cumsum(taken)))
+    sure[blocked[high] - blocked[low] > 0] = 0.0
+    found: list[tuple[int, int]] = []
+    for index in np.argsort(-sure):
+        if sure[index] < least_sigmas:
+            break
+        place, width = int(places[index]), int(half[index])
+        if all(abs(place - other) > 2 * max(width, reached) for other, reached in found):
+            found.append((place, width))
+    return found
+
+
 def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: float = 0.0) -> tuple[Line, ...]:
     """Find the lines of a spectrum.
 
     A line is a peak that stands over the local floor by more than chance and
     more than `prominence_db`, and over the valleys beside it by more than the
     scatter of the estimate, so that the flank of a strong line or the ragged
-    top of a broad one gives no second line.
+    top of a broad one gives no second line; nor does the top of a resonance,
+    which does not stand over what lies right beside it. Then a line that the
+    speed smears, so that it stands out only in the sum over its width.
 
     Parameters
     ----------
@@ -137,31 +254,80 @@ def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: fl
         Least prominence (see `Line`).
     speed_scatter : float
         Relative standard deviation of the speed within the run: a line that
-        follows the speed may be that much smeared.
+        follows the speed may be that much smeared. 0 where it is not known: then
+        the smear that strong lines share, or else `UNKNOWN_SCATTER`.
 
     Returns
     -------
     tuple of Line
         By frequency.
     """
-    floor = local_floor(spectrum)
-    if spectrum.density.size < 2 * MAIN_LOBE + 3 or not np.all(np.isfinite(spectrum.density)):
+    density, floor = spectrum.density, local_floor(spectrum)
+    if density.size < 2 * MAIN_LOBE + 3 or not np.all(np.isfinite(density)):
         return ()
     height_db, valley_db = _thresholds(spectrum, prominence_db)
-    over_db = 10.0 * np.log10(np.maximum(spectrum.density, floor * 1e-3) / floor)
+    over_db = 10.0 * np.log10(np.maximum(density, floor * 1e-3) / floor)
     peaks, _ = signal.find_peaks(over_db, height=height_db, prominence=valley_db)
     lowest = max(MAIN_LOBE + 1, math.ceil(LOWEST_HZ / spectrum.resolution_hz))
-    peaks = peaks[(peaks >= lowest) & (peaks < spectrum.density.size - MAIN_LOBE - 1)]
-    excess = np.clip(spectrum.density - floor, 0.0, None)
-    taken = np.zeros(spectrum.density.size, dtype=bool)
-    lines = []
-    for peak in peaks[np.argsort(-over_db[peaks])]:
+    peaks = peaks[(peaks >= lowest) & (peaks < density.size - MAIN_LOBE - 1)]
+    if speed_scatter == 0.0:
+        speed_scatter = _smear_of_lines(density - floor, over_db, peaks)
+    search = _Search(spectrum, floor, prominence_db)
+    for peak in map(int, peaks[np.argsort(-over_db[peaks])]):
+        search.take_peak(peak, speed_scatter, height_db)
+    least_sigmas = BUMP_SIGMAS if speed_scatter > 0.0 else BLIND_BUMP_SIGMAS
+    for relative in (speed_scatter,) if speed_scatter > 0.0 else UNKNOWN_SCATTER:
+        search.take_bumps(relative, least_sigmas)
+    return tuple(sorted(search.lines, key=lambda line: line.frequency_hz))
+
+
+class _Search:
+    """The lines of a spectrum found so far, and which of its frequencies they fill."""
+
+    def __init__(self, spectrum: Spectrum, floor: Array, prominence_db: float) -> None:
+        self._spectrum, self._floor, self._prominence_db = spectrum, floor, prominence_db
+        self._difference = spectrum.density - floor
+        self._scatter = floor / math.sqrt(spectrum.averages)
+        freedom = 2.0 * spectrum.averages
+        self._mean_over_median = freedom / float(stats.chi2.median(freedom))
+        self._taken = np.zeros(floor.size, dtype=bool)
+        self.lines: list[Line] = []
+
+    def take_peak(self, peak: int, speed_scatter: float, height_db: float) -> None:
+        """Take a peak that no stronger line has filled, as broad as the speed or its own shape makes it."""
+        if self._taken[peak]:
+            return
         smear = math.ceil(2.5 * speed_scatter * peak)
-        if taken[peak]:
-            continue
-        reach = _reach(excess, int(peak), MAIN_LOBE + smear, float(floor[peak]) / math.sqrt(spectrum.averages))
-        line = _measure(spectrum, floor, int(peak), reach)
-        if line is not None and line.prominence_db >= prominence_db:
-            lines.append(line)
-            taken[max(0, peak - reach) : peak + reach + 1] = True
-    return tuple(sorted(lines, key=lambda line: line.frequency_hz))
+        if smear > 1 and _is_smeared(self._difference, self._scatter, peak, smear):
+            centre = _recentred(self._difference, peak, smear)
+            self._take(centre, MAIN_LOBE + max(smear, abs(centre - peak)), height_db)
+        else:
+            excess = np.clip(self._difference, 0.0, None)
+            self._take(peak, _reach(excess, peak, MAIN_LOBE + min(smear, 1), float(self._scatter[peak])), height_db)
+
+    def take_bumps(self, relative: float, least_sigmas: float) -> None:
+        """Take lines that stand out only in the sum over a relative smear."""
+        guarded = _guarded(self._taken, self._spectrum.density, self._floor, relative)
+        for place, half in _broad_bumps(self._spectrum, self._floor, guarded, relative, least_sigmas):
+            self._take(_recentred(self._difference, place, half), half + MAIN_LOBE, 0.0)
+
+    def _take(self, centre: int, reach: int, least_db: float) -> None:
+        """Measure and keep a line, unless it is too weak or the top of a resonance."""
+        density = self._spectrum.density
+        low, high = max(1, centre - reach), min(density.size, centre + reach + 1)
+        line = _measure(self._spectrum, self._floor, centre, reach)
+        beside = self._beside(low, high)
+        over_beside_db = 10.0 * math.log10(float(density[low:high].max()) / beside) if beside > 0.0 else math.inf
+        if line is not None and line.prominence_db >= self._prominence_db and over_beside_db >= least_db:
+            self.lines.append(line)
+            self._taken[low:high] = True
+
+    def _beside(self, low: int, high: int) -> float:
+        """Floor right beside `low` to `high`: the median of the quieter side, lines left out; 0 where none is free."""
+        density, width = self._spectrum.density, SHOULDER + (high - low)
+        sides = []
+        for start, end in ((max(1, low - width), low), (high, min(density.size, high + width))):
+            free = density[start:end][~self._taken[start:end]]
+            if free.size >= SHOULDER // 2:
+                sides.append(float(np.median(free)))
+        return min(sides, default=0.0) * self._mean_over_median

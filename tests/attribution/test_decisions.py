@@ -106,7 +106,9 @@ def test_a_sensor_20_db_more_sensitive_changes_nothing(tmp_path):
     lines = line("motor", "frequency_hz = 905", motor=25, gearbox=12, receiver=22)
     plain = recipe(lines)
     keen = plain.replace('component = "gearbox"', 'component = "gearbox"\ngain_db = 20')
-    found = [analyze(campaign(tmp_path / n, text), tmp_path / "store").tables for n, text in (("a", plain), ("b", keen))]
+    found = [
+        analyze(campaign(tmp_path / n, text), tmp_path / "store").tables for n, text in (("a", plain), ("b", keen))
+    ]
     for tables in found:
         (source,) = tables["sources"].to_dict("records")
         assert (source["radiator"], source["source"]) == ("motor", "motor")
