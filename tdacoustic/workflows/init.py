@@ -16,7 +16,7 @@ from tdacoustic.errors import CampaignError, OutputError, UnitError
 from tdacoustic.formats import scan
 from tdacoustic.recording import Log, LogChannel
 from tdacoustic.toml_models import unique_name
-from tdacoustic.units import parse_unit, quantity_of_unit
+from tdacoustic.units import QUANTITY_SI_SYMBOL, parse_unit, quantity_of_unit
 
 __all__ = ["InitResult", "campaign_text", "make_campaign", "toml_string", "write_campaign"]
 
@@ -249,6 +249,14 @@ def _channel_lines(signal: _Signal, n_logs: int, missing: list[str]) -> Iterator
         yield f"# in {len(signal.said)} of {n_logs} logs"
 
 
+def _fits(unit: str, quantity: str | None) -> bool:
+    """Whether a quantity can be in a unit."""
+    if quantity is None:
+        return False
+    symbols = {"other": parse_unit(unit).si_symbol, "speed": "m/s"}
+    return parse_unit(unit).si_symbol in (QUANTITY_SI_SYMBOL.get(quantity), symbols.get(quantity))
+
+
 def _scale_lines(signal: _Signal, unit: str | None, quantity: str | None, missing: list[str]) -> Iterator[str]:
     first = signal.said[0]
     if quantity == "tacho":
@@ -266,9 +274,12 @@ def _scale_lines(signal: _Signal, unit: str | None, quantity: str | None, missin
         missing.append(f"channel {signal.name!r}: quantity and sensitivity, if it is a sensor")
         return
     if unit is not None:
-        if quantity is not None and quantity_of_unit(unit) in (quantity, None):
-            yield f"quantity = {toml_string(quantity)}"
+        if _fits(unit, quantity):
+            yield f"quantity = {toml_string(str(quantity))}"
         yield f"unit = {toml_string(unit)}   # as the log says"
+        if quantity is not None and not _fits(unit, quantity):
+            yield f'# quantity = ""   # the log says {toml_string(quantity)}, which is not in {toml_string(unit)}'
+            missing.append(f"channel {signal.name!r}: quantity (the log's, {quantity}, is not in {unit!r})")
         return
     if quantity not in (None, "voltage", "other"):
         yield f"quantity = {toml_string(str(quantity))}"
