@@ -30,6 +30,11 @@ FREQUENCY_VARIANCE = (0.096, 1.03)
 """Variance of the interpolated frequency, in lines², is ``(a / s + b / s²) / averages`` with s the power over
 the floor: fitted to simulations at 50 % overlap, s from 4 to 10000; a test holds it."""
 
+WANDER_SIGMAS = 1.5
+"""Widening of a line by the speed that is believed, over the speed's own standard deviation."""
+WANDER_CORRELATION = 0.25
+"""Over the variance of the mean of as many independent values; a test on wandering speeds holds it."""
+
 BROAD = 0.1
 """A peak whose neighbours beyond its main lobe hold more than this part of its power is broad."""
 WIDEST = 64
@@ -86,11 +91,13 @@ def _thresholds(spectrum: Spectrum, prominence_db: float) -> tuple[float, float]
 
 
 def _interpolated_offset(excess: Array, peak: int) -> float:
-    """Distance of a sinusoid from the peak line, in lines, from the ratio of the two highest (Hann)."""
-    left, right = excess[peak - 1], excess[peak + 1]
-    side = 1.0 if right >= left else -1.0
-    ratio = math.sqrt(max(left, right, 0.0) / excess[peak])
-    return side * float(np.clip((2.0 * ratio - 1.0) / (ratio + 1.0), -0.5, 0.5))
+    """Distance of a sinusoid from the peak line, in lines, from its ratios to both neighbours (Hann), by their power."""
+    offset, weight = 0.0, 0.0
+    for side, power in ((-1.0, float(excess[peak - 1])), (1.0, float(excess[peak + 1]))):
+        ratio = math.sqrt(max(power, 0.0) / excess[peak])
+        offset += power * side * (2.0 * ratio - 1.0) / (ratio + 1.0)
+        weight += power
+    return float(np.clip(offset / weight, -0.5, 0.5)) if weight > 0.0 else 0.0
 
 
 def _reach(excess: Array, peak: int, least: int, scatter: float) -> int:
@@ -105,8 +112,12 @@ def _reach(excess: Array, peak: int, least: int, scatter: float) -> int:
     return max(least, WIDEST)
 
 
-def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int) -> Line | None:
-    """Measure the line around a peak; `reach` lines to each side belong to it."""
+def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int, speed_scatter: float) -> Line | None:
+    """Measure the line around a peak; `reach` lines to each side belong to it.
+
+    Where the speed wandered, a line that followed it is a little wider than the window even if no
+    smear is seen, and its frequency is only as sure as the mean over the wander.
+    """
     density = spectrum.density
     low, high = max(1, peak - reach), min(density.size - 1, peak + reach + 1)
     excess = np.clip(density - floor, 0.0, None)
@@ -123,8 +134,8 @@ def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int) -> Line | 
     over_floor = power / (float(floor[peak]) * spectrum.noise_bandwidth_hz)
     linear, quadratic = FREQUENCY_VARIANCE
     variance = (linear / over_floor + quadratic / over_floor**2) / spectrum.averages
-    if smeared:
-        variance += extra / spectrum.averages
+    wander = extra if smeared else min(extra, (WANDER_SIGMAS * speed_scatter * peak) ** 2)
+    variance += WANDER_CORRELATION * wander / spectrum.averages
     return Line(
         frequency_hz=(peak + offset) * spectrum.resolution_hz,
         frequency_error_hz=math.sqrt(variance) * spectrum.resolution_hz,
@@ -272,9 +283,9 @@ def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: fl
     peaks = peaks[(peaks >= lowest) & (peaks < density.size - MAIN_LOBE - 1)]
     if speed_scatter == 0.0:
         speed_scatter = _smear_of_lines(density - floor, over_db, peaks)
-    search = _Search(spectrum, floor, prominence_db)
+    search = _Search(spectrum, floor, prominence_db, speed_scatter)
     for peak in map(int, peaks[np.argsort(-over_db[peaks])]):
-        search.take_peak(peak, speed_scatter, height_db)
+        search.take_peak(peak, height_db)
     least_sigmas = BUMP_SIGMAS if speed_scatter > 0.0 else BLIND_BUMP_SIGMAS
     for relative in (speed_scatter,) if speed_scatter > 0.0 else UNKNOWN_SCATTER:
         search.take_bumps(relative, least_sigmas)
@@ -284,20 +295,21 @@ def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: fl
 class _Search:
     """The lines of a spectrum found so far, and which of its frequencies they fill."""
 
-    def __init__(self, spectrum: Spectrum, floor: Array, prominence_db: float) -> None:
+    def __init__(self, spectrum: Spectrum, floor: Array, prominence_db: float, speed_scatter: float) -> None:
         self._spectrum, self._floor, self._prominence_db = spectrum, floor, prominence_db
         self._difference = spectrum.density - floor
         self._scatter = floor / math.sqrt(spectrum.averages)
         freedom = 2.0 * spectrum.averages
         self._mean_over_median = freedom / float(stats.chi2.median(freedom))
         self._taken = np.zeros(floor.size, dtype=bool)
+        self._speed_scatter = speed_scatter
         self.lines: list[Line] = []
 
-    def take_peak(self, peak: int, speed_scatter: float, height_db: float) -> None:
+    def take_peak(self, peak: int, height_db: float) -> None:
         """Take a peak that no stronger line has filled, as broad as the speed or its own shape makes it."""
         if self._taken[peak]:
             return
-        smear = math.ceil(2.5 * speed_scatter * peak)
+        smear = math.ceil(2.5 * self._speed_scatter * peak)
         if smear > 1 and _is_smeared(self._difference, self._scatter, peak, smear):
             centre = _recentred(self._difference, peak, smear)
             self._take(centre, MAIN_LOBE + max(smear, abs(centre - peak)), height_db)
@@ -315,7 +327,7 @@ class _Search:
         """Measure and keep a line, unless it is too weak or the top of a resonance."""
         density = self._spectrum.density
         low, high = max(1, centre - reach), min(density.size, centre + reach + 1)
-        line = _measure(self._spectrum, self._floor, centre, reach)
+        line = _measure(self._spectrum, self._floor, centre, reach, self._speed_scatter)
         beside = self._beside(low, high)
         over_beside_db = 10.0 * math.log10(float(density[low:high].max()) / beside) if beside > 0.0 else math.inf
         if line is not None and line.prominence_db >= self._prominence_db and over_beside_db >= least_db:

@@ -16,7 +16,7 @@ MAX_HARMONIC = 20
 MAX_DIVISOR = 3
 """The lowest line seen may be at most this harmonic of its family."""
 LOWEST_FUNDAMENTAL_HZ = 10.0
-CHANCE = 1e-3
+CHANCE = 5e-3
 """Probability of as good a match among lines placed at random, at most."""
 MIN_MEMBERS = 3
 SIGMAS = 3.0
@@ -71,7 +71,7 @@ def find_families(lines: Sequence[Line], resolution_hz: float) -> tuple[Family, 
     """Group lines into families of harmonics, the least accidental first.
 
     A family has at least three members, one of them among the first two
-    harmonics, and is less likely by chance than one in a thousand, the number
+    harmonics, and is less likely by chance than one in two hundred, the number
     of fundamentals tried counted in. A line belongs to one family at most.
 
     Parameters

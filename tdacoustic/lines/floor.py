@@ -18,7 +18,7 @@ HALF_WIDTH_RELATIVE = 0.03
 """The same at high frequency, over the frequency."""
 KNOTS_PER_HALF_WIDTH = 8
 """Places at which the median is taken, interpolated between them; one at each line takes nine times as long."""
-DYNAMIC_RANGE = 1e-20
+DYNAMIC_RANGE = 1e-13
 """The floor is not taken below this part of the highest density: arithmetic, not signal."""
 
 

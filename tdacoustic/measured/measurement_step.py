@@ -169,4 +169,4 @@ def _bands(raster: RasterSurvey, name: str, lines: Sequence[Line]) -> tuple[Band
     )
 
 
-MEASUREMENT = Step("measurement", 3, measure_run, "Levels, spectra, lines and quality")
+MEASUREMENT = Step("measurement", 4, measure_run, "Levels, spectra, lines and quality")
