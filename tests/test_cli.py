@@ -145,7 +145,7 @@ def test_spaces_and_umlauts_in_every_name(tda, tmp_path):
     assert out.startswith("Condition Übergang 1")
     assert rows(tmp_path / "Ergebnis für Zürich" / "levels.csv")[0]["condition"] == "Übergang 1"
     manifest = json.loads((tmp_path / "Ergebnis für Zürich" / "manifest.json").read_text(encoding="utf-8"))
-    assert manifest["inputs"][0]["file"] == "Lauf übung 1.h5"
+    assert [entry["file"] for entry in manifest["inputs"]] == ["campaign.toml", "Lauf übung 1.h5"]
 
 
 def test_quiet_says_nothing(tda, tmp_path):

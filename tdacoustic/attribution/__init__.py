@@ -8,7 +8,7 @@ from tdacoustic.attribution.dominance import Dominance, dominance_of_condition
 from tdacoustic.attribution.evidence import EVIDENCE, EvidenceSettings, RunEvidence
 from tdacoustic.attribution.judgement import ConditionLine
 from tdacoustic.attribution.kinematic import RunKinematics, run_kinematics
-from tdacoustic.attribution.sources import ConditionEvidence, SourceLine, attribute
+from tdacoustic.attribution.sources import ConditionEvidence, SourceLine, attribute, means_line
 
 __all__ = [
     "EVIDENCE",
@@ -21,5 +21,6 @@ __all__ = [
     "SourceLine",
     "attribute",
     "dominance_of_condition",
+    "means_line",
     "run_kinematics",
 ]

@@ -12,7 +12,7 @@ from tdacoustic.attribution.judgement import ConditionLine, Draws, JudgedLine, d
 from tdacoustic.attribution.kinematic import RunKinematics
 from tdacoustic.campaign import Exclude, Override
 
-__all__ = ["ConditionEvidence", "SourceLine", "attribute"]
+__all__ = ["ConditionEvidence", "SourceLine", "attribute", "means_line"]
 
 OVERRIDE_SPREAD = 0.005
 """Relative distance at which an override still means a line."""
@@ -162,11 +162,12 @@ def _excluded(line: ConditionLine, excludes: Sequence[Exclude]) -> bool:
     )
 
 
+def means_line(override: Override, line: ConditionLine) -> bool:
+    """Whether an override means a line: its condition, and its frequency within 2 Hz or 0.5 %."""
+    near_hz = max(OVERRIDE_HZ, OVERRIDE_SPREAD * line.frequency_hz)
+    return override.condition == line.condition and abs(override.frequency_hz - line.frequency_hz) <= near_hz
+
+
 def _override_of(line: ConditionLine, overrides: Sequence[Override]) -> Override | None:
-    near = [
-        override
-        for override in overrides
-        if override.condition == line.condition
-        and abs(override.frequency_hz - line.frequency_hz) <= max(OVERRIDE_HZ, OVERRIDE_SPREAD * line.frequency_hz)
-    ]
+    near = [override for override in overrides if means_line(override, line)]
     return min(near, key=lambda override: abs(override.frequency_hz - line.frequency_hz), default=None)

@@ -72,6 +72,7 @@ def load_campaign(path: str | Path) -> Campaign:
         fleet=file.fleet,
         meta=tuple(meta_lines(file.meta)),
         channels=file.channel,
+        run_table=file.runs,
         runs=with_names(file.run),
         levels=file.level,
         excludes=file.exclude,

@@ -56,6 +56,8 @@ class Campaign:
         One of `Origin`.
     fleet : WrittenPath or None
         It need not exist.
+    run_table : WrittenPath or None
+        The ``runs.csv`` that the runs stand in.
     meta : tuple of (str, str)
         ``[meta]`` in words; keys of nested tables joined by a dot.
     channels : tuple of CampaignChannel
@@ -72,6 +74,7 @@ class Campaign:
     name: str
     origin: Origin
     fleet: WrittenPath | None = None
+    run_table: WrittenPath | None = None
     meta: tuple[tuple[str, str], ...] = ()
     channels: tuple[CampaignChannel, ...] = ()
     runs: tuple[CampaignRun, ...] = ()

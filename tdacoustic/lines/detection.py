@@ -91,7 +91,7 @@ def _thresholds(spectrum: Spectrum, prominence_db: float) -> tuple[float, float]
 
 
 def _interpolated_offset(excess: Array, peak: int) -> float:
-    """Distance of a sinusoid from the peak line, in lines, from its ratios to both neighbours (Hann), by their power."""
+    """Distance of a sinusoid from the peak line, in lines: its ratio to each neighbour (Hann), by their power."""
     offset, weight = 0.0, 0.0
     for side, power in ((-1.0, float(excess[peak - 1])), (1.0, float(excess[peak + 1]))):
         ratio = math.sqrt(max(power, 0.0) / excess[peak])
@@ -200,7 +200,7 @@ def _guarded(taken: NDArray[np.bool_], density: Array, floor: Array, relative: f
         side = -1 if taken[edge + 1] else 1
         far = max(SHOULDER // 2, math.ceil(GUARD * relative * edge))
         end = edge + side * far
-        while 0 < end < density.size - 4 and np.median(density[end - 3 : end + 4] / floor[end - 3 : end + 4]) > 2.0:
+        while 3 < end < density.size - 4 and np.median(density[end - 3 : end + 4] / floor[end - 3 : end + 4]) > 2.0:
             end += side
         low, high = sorted((edge, end))
         guarded[max(0, low) : high + 1] = True

@@ -33,7 +33,8 @@ class RunLevel:
     """One row of ``levels.csv``: a channel of a run.
 
     Levels are None where the quantity has none or the channel is not usable;
-    `level_db` and `laeq_db` are corrected for background, `rms` is as measured.
+    `level_db`, `laeq_db` and `level_band_db` are corrected for background, each
+    by its own; `rms` is as measured.
     """
 
     run: str
@@ -118,8 +119,12 @@ def condition_levels(
     )
 
 
-def _backgrounds(runs: Sequence[MeasuredRun], of_run: CampaignRun) -> Mapping[str, tuple[float | None, float | None]]:
-    """Background level and A-weighted level of each channel."""
+Background = tuple[float | None, float | None, float | None]
+"""Level, A-weighted level and level in the band of a channel's background."""
+
+
+def _backgrounds(runs: Sequence[MeasuredRun], of_run: CampaignRun) -> Mapping[str, Background]:
+    """Background of each channel, the energy mean of the runs that hold for a run."""
     held = [
         run
         for run in runs
@@ -140,6 +145,9 @@ def _backgrounds(runs: Sequence[MeasuredRun], of_run: CampaignRun) -> Mapping[st
         name: (
             energy_mean_db(level for r in results if (level := level_db(r.rms, quantities[name])) is not None),
             energy_mean_db(r.laeq_db for r in results if r.laeq_db is not None),
+            energy_mean_db(
+                level for r in results if (level := level_db(r.band_rms or 0.0, quantities[name])) is not None
+            ),
         )
         for name, results in levels.items()
     }
@@ -149,10 +157,10 @@ def _run_level(
     run: MeasuredRun,
     channel: Channel,
     result: ChannelResult,
-    backgrounds: Mapping[str, tuple[float | None, float | None]],
+    backgrounds: Mapping[str, Background],
     train_speed_km_h: float | None,
 ) -> RunLevel:
-    background_db, background_a_db = backgrounds.get(channel.name, (None, None))
+    background_db, background_a_db, background_band_db = backgrounds.get(channel.name, (None, None, None))
     level = level_db(result.rms, channel.quantity) if result.usable else None
     corrected, laeq_db, correction = level, result.laeq_db if result.usable else None, "none"
     if level is not None:
@@ -161,6 +169,8 @@ def _run_level(
     if laeq_db is not None:
         laeq_db = correct_for_background(laeq_db, background_a_db).level_db
     band = None if result.band_rms is None or not result.usable else level_db(result.band_rms, channel.quantity)
+    if band is not None:
+        band = correct_for_background(band, background_band_db).level_db
     return RunLevel(
         run=run.name,
         condition=run.run.condition,

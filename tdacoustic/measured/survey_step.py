@@ -131,4 +131,4 @@ def _survey_raster(
     )
 
 
-SURVEY = Step("survey", 2, survey_run, "Block powers, bands and statistics")
+SURVEY = Step("survey", 3, survey_run, "Block powers, bands and statistics")

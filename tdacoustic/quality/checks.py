@@ -114,7 +114,7 @@ def _clipping(channel: Channel, statistics: Statistics, index: int) -> Verdict:
         channel.name,
         "clipping",
         "bad" if part > CLIPPED_BAD else "warning",
-        f"{count} samples ({100 * part:.2g} %) {where} ({extremes})",
+        f"{count} samples ({100 * part:.3g} %) {where} ({extremes})",
     )
 
 
@@ -128,7 +128,7 @@ def _flat(channel: Channel, statistics: Statistics, index: int) -> Verdict:
         channel.name,
         "dropouts",
         "bad" if part > FLAT_BAD else "warning",
-        f"{100 * part:.2g} % of the record stands still; the longest stretch is {longest_s:.3g} s",
+        f"{100 * part:.3g} % of the record stands still; the longest stretch is {longest_s:.3g} s",
     )
 
 

@@ -50,7 +50,7 @@ def check_speed(
         if said and profile.is_constant(tolerance) and abs(profile.mean / said - 1.0) > STATED_TOLERANCE:
             words = f"measured {factor * profile.mean:.5g} {unit}, stated {factor * said:.5g} {unit}"
             found.append(Verdict(profile.channel, "speed", "warning", words))
-    if not profiles:
+    if not profiles and not problems:
         words = "from the campaign" if stated else "not known: no speed or tacho channel, and the campaign gives none"
         found.append(Verdict("", "speed", "ok" if stated else "warning", words))
     return tuple(found)

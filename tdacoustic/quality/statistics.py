@@ -20,7 +20,10 @@ FLAT_SAMPLES = 16
 """A stretch of identical values is flat from this long on, and from this many samples on."""
 
 PLATEAU_SAMPLES = 3
-"""Identical values in a row at a record's extreme that count as clipped."""
+"""Identical values in a row at a record's extreme from which it is clipped."""
+
+PILE_SAMPLES = 8
+"""Samples at a record's extreme, in a row or not, from which it is clipped: noise that is cut has no long plateaus."""
 
 PLATEAU_OVER_NEXT = 4
 """Samples on a plateau over those at the next value, at least: the crest of a sine in whole numbers has up to 2.4."""
@@ -42,7 +45,7 @@ class Statistics:
     at_limits : ndarray of int
         Samples at the smallest or largest value the logger can store.
     plateau : ndarray of int
-        Samples in runs of at least `PLATEAU_SAMPLES` equal values at the record's own extremes.
+        Samples at the record's own extremes, where these are a plateau or a pile (`PLATEAU_SAMPLES`, `PILE_SAMPLES`).
     flat_samples, longest_flat : ndarray of int
         Samples in flat stretches, and the longest stretch.
     correlation : ndarray, shape (n_channels, n_channels)
@@ -63,7 +66,7 @@ class Statistics:
 
 
 class _Plateau:
-    """Counts runs of equal values at the extreme seen so far, on one side, and the samples at the value next to it."""
+    """Counts samples at the extreme seen so far, on one side, those in runs, and those at the value next to it."""
 
     def __init__(self) -> None:
         self.extreme = self.second = -math.inf
@@ -73,8 +76,9 @@ class _Plateau:
 
     @property
     def count(self) -> int:
-        """Samples in runs; none where the value next to the extreme is nearly as frequent: a rounded crest."""
-        return self._in_runs if self._in_runs > PLATEAU_OVER_NEXT * self._at_second else 0
+        """Samples at the extreme; none where the value next to it is nearly as frequent: a rounded crest."""
+        clipped = self._in_runs >= PLATEAU_SAMPLES or self._at_extreme >= PILE_SAMPLES
+        return self._at_extreme if clipped and self._at_extreme > PLATEAU_OVER_NEXT * self._at_second else 0
 
     def take(self, values: Array, top: float) -> None:
         if not math.isfinite(top) or top < self.second:
@@ -210,7 +214,12 @@ class StatisticsMeter:
             minimum=self._minimum.copy(),
             maximum=self._maximum.copy(),
             at_limits=self._at_limits.copy(),
-            plateau=np.array([top.count + bottom.count for top, bottom in zip(self._tops, self._bottoms, strict=True)]),
+            plateau=np.array(
+                [  # a constant signal stands still; it has no extremes to be cut at
+                    0 if top.extreme == -bottom.extreme else top.count + bottom.count
+                    for top, bottom in zip(self._tops, self._bottoms, strict=True)
+                ]
+            ),
             flat_samples=np.array([flats.samples for flats in self._flats]),
             longest_flat=np.array([flats.longest for flats in self._flats]),
             correlation=correlation,

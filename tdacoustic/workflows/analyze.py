@@ -55,7 +55,7 @@ def analyze(
         The campaign or its fleet is wrong, or no run can be used.
     """
     from tdacoustic.steps import execute, lineage, result_of
-    from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems
+    from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems, written_inputs
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
@@ -75,7 +75,8 @@ def analyze(
                 evidence[name] = result_of(task, store)
             records.update(lineage(task, store))
     problems += [*run_problems(prepared, failures), *_missing_receivers(campaign, runs), *_not_built(campaign)]
-    return _assemble(campaign, fleet, runs, evidence, (problems, log_inputs(prepared), tuple(records.items())))
+    inputs = (*written_inputs(campaign, fleet is not None), *log_inputs(prepared))
+    return _assemble(campaign, fleet, runs, evidence, (problems, inputs, tuple(records.items())))
 
 
 def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:
@@ -104,6 +105,8 @@ def _raise_if_all_failed(failures: Mapping[str, TdacousticError], n_tasks: int) 
 def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[str]:
     from tdacoustic.measured.runs import receivers
 
+    if campaign.runs and not any(run.valid for run in campaign.runs):
+        return ["all runs are rejected: nothing is analysed"]
     if campaign.runs and not receivers(runs):
         return ["no microphone among the channels: no noise level, no noise lines, no dominance"]
     return []
@@ -156,11 +159,22 @@ def _assemble(
         energy = _receiver_energy(held, microphones)
         spread_db = levels.spread_db(condition, microphones)
         dominance.append(dominance_of_condition(condition, found, draws, energy, len(steady), spread_db))
-    tables = measured_tables(campaign, runs, levels, sources, dominance, kinematics)
     problems, inputs, records = origins
+    problems = [*problems, *_unused_overrides(campaign, sources)]
+    tables = measured_tables(campaign, runs, levels, sources, dominance, kinematics)
     return Analysis(
         campaign, runs, tuple(sources), tuple(dominance), tables, tuple(problems), inputs, records, fleet, kinematics
     )
+
+
+def _unused_overrides(campaign: Campaign, sources: Sequence[SourceLine]) -> list[str]:
+    from tdacoustic.attribution import means_line
+
+    return [
+        f"override of {override.frequency_hz:g} Hz in condition {override.condition}: there is no such noise line"
+        for override in campaign.overrides
+        if not any(means_line(override, source.line) for source in sources)
+    ]
 
 
 def _is_steady(run: MeasuredRun) -> bool:

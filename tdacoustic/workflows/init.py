@@ -169,9 +169,8 @@ def campaign_text(logs: Sequence[Log], folder: str | Path) -> InitResult:
     for signal in signals:
         lines += ["", *_channel_lines(signal, len(logs), missing)]
     lines += _difference_lines(logs, signals, missing)
-    has_speed = any(_quantity(signal) in ("speed", "tacho") for signal in signals)
     for log, path, name in zip(logs, paths, _run_names(logs), strict=True):
-        lines += ["", *_run_lines(log, path, name, has_speed, missing)]
+        lines += ["", *_run_lines(log, path, name, _has_speed(log), missing)]
     return InitResult("\n".join(lines) + "\n", tuple(missing))
 
 
@@ -317,6 +316,10 @@ def _run_names(logs: Sequence[Log]) -> list[str]:
 def _speed_in_name(stem: str) -> float | None:
     found = _SPEED_IN_NAME.findall(stem)
     return float(found[0]) if len(found) == 1 and float(found[0]) > 0.0 else None
+
+
+def _has_speed(log: Log) -> bool:
+    return any((channel.quantity or quantity_of_unit(channel.unit)) in ("speed", "tacho") for channel in log.channels)
 
 
 def _run_lines(log: Log, path: str, name: str, has_speed: bool, missing: list[str]) -> Iterator[str]:

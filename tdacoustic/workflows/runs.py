@@ -17,7 +17,7 @@ from tdacoustic.recording import Channel, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
 
-__all__ = ["PreparedRun", "gather_run", "log_inputs", "prepare_runs", "run_problems"]
+__all__ = ["PreparedRun", "gather_run", "log_inputs", "prepare_runs", "run_problems", "written_inputs"]
 
 
 @dataclass(frozen=True)
@@ -168,6 +168,18 @@ def run_problems(prepared: Sequence[PreparedRun], failures: Mapping[str, Tdacous
         elif item.bound is not None:
             found += [refusal.reason for refusal in item.bound.refused]
     return found
+
+
+def written_inputs(campaign: Campaign, with_fleet: bool) -> tuple[LogInput, ...]:
+    """Return the files that people wrote: the campaign, its table of runs, its fleet."""
+    files = [(campaign.path.name, campaign.path, "campaign")]
+    if campaign.run_table is not None:
+        files.append((campaign.run_table.text, campaign.run_table.path, "runs"))
+    if campaign.fleet is not None and with_fleet:
+        path = campaign.fleet.path
+        files.append((campaign.fleet.text, path / "fleet.toml" if path.is_dir() else path, "fleet"))
+    hashed = [(text, log_file(path), kind) for text, path, kind in files]
+    return tuple(LogInput(text, file.sha256, file.n_bytes, kind) for text, file, kind in hashed)
 
 
 def log_inputs(prepared: Sequence[PreparedRun]) -> tuple[LogInput, ...]:

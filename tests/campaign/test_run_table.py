@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import pytest
 
 from tdacoustic.campaign import SCHEMA, load_campaign
@@ -38,7 +40,8 @@ def test_semicolons_byte_order_mark_crlf_and_quoted_logs(load):
 def test_the_same_runs_as_in_toml(load):
     by_table = load(CHANNEL, runs_csv="condition,logs,end_s\n1,a.h5,10\n")
     by_toml = load('[[channel]]\nname = "mic_1"\nunit = "Pa"\n[[run]]\ncondition = "1"\nlogs = ["a.h5"]\nend_s = 10\n')
-    assert by_table == by_toml
+    assert by_table.run_table is not None
+    assert replace(by_table, run_table=None) == by_toml
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def clipped(rng, x):
 
 
 def softly_clipped(rng, x):
-    top = np.quantile(x, 0.99)
+    top = np.quantile(x, 0.995)
     return np.minimum(x, top)
 
 

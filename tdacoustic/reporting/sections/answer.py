@@ -68,7 +68,7 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
         return f"{words}: {level}; a run-up, so no lines and no dominant source."
     verdict = next((v for v in analysis.dominance if v.condition == condition), None)
     held = [source for source in analysis.sources if source.line.condition == condition]
-    lines = _strongest_words(held) or ("no noise lines" if runs else "")
+    lines = _strongest_words(held) or (_no_lines_words(analysis, condition) if runs else "")
     if analysis.fleet is None or verdict is None or not held:
         parts = [f"{words}: {level}", lines]
         if verdict is not None and verdict.line_fraction is not None and held:
@@ -266,6 +266,11 @@ def _stated_levels(analysis: Analysis, condition: str) -> str:
     return f"{joined(words)}, stated and not recorded, so no lines and no dominant source" if words else ""
 
 
+def _no_lines_words(analysis: Analysis, condition: str) -> str:
+    excluded = any(exclude.condition == condition for exclude in analysis.campaign.excludes)
+    return "no noise lines but those that the campaign excludes" if excluded else "no noise lines"
+
+
 def _level_words(analysis: Analysis, condition: str) -> str:
     microphones = receivers(analysis.runs)
     table = analysis.tables["levels"]
@@ -279,9 +284,6 @@ def _level_words(analysis: Analysis, condition: str) -> str:
         words.append(f"{weighted:.1f} dB(A)")
     if not words:
         return ""
-    where = (
-        f"energy mean of {len(microphones)} microphones"
-        if len(microphones) > 1
-        else "at " + str(chosen["channel"].iloc[0])
-    )
+    used = list(dict.fromkeys(chosen.loc[chosen["level_db"].notna() | chosen["laeq_db"].notna(), "channel"]))
+    where = f"energy mean of {len(used)} microphones" if len(used) > 1 else f"at {used[0]}"
     return f"{' or '.join(words)} re 20 µPa, {where}"

@@ -28,7 +28,8 @@ def levels(analysis: Analysis) -> Section:
     blocks.append(
         Paragraph(
             "The rms is of the whole record after its mean is removed; the level is that rms, corrected for background "
-            "where background runs exist. The A-weighted level applies the analytic curve of IEC 61672-1 to the "
+            "where background runs exist, and so are the A-weighted level and that in the band, each by its own; rms "
+            "and third octaves are as measured. The A-weighted level applies the analytic curve of IEC 61672-1 to the "
             "spectrum. The level in the band leaves out what lies outside the band given beside it."
         )
     )

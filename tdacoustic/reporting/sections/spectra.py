@@ -250,4 +250,7 @@ def _line_table(analysis: Analysis, run: MeasuredRun) -> Details | None:
         for row in held.to_dict("records")
     ]
     name = slug("lines", run.name)
-    return Details(f"{len(rows)} lines of run {run.name}", [Table(name, f"Lines of run {run.name}", columns, rows)])
+    return Details(
+        f"{len(rows)} {'line' if len(rows) == 1 else 'lines'} of run {run.name}",
+        [Table(name, f"Lines of run {run.name}", columns, rows)],
+    )

@@ -77,9 +77,12 @@ def speed_words(run: MeasuredRun) -> str:
         words.append(f"{run.train_speed_km_h:.4g} km/h")
     if run.motor_speed_hz is not None:
         words.append(f"motor {60.0 * run.motor_speed_hz:.4g} rpm")
-    if run.measurement is not None and not run.measurement.steady:
-        profile = run.measurement.speed.leading
-        if profile is not None:
+    profile = None if run.measurement is None else run.measurement.speed.leading
+    if profile is not None and run.measurement is not None:
+        if run.measurement.steady and not words:  # nobody says of which shaft it is
+            factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
+            words.append(f"{profile.channel} {factor * profile.mean:.4g} {unit}")
+        elif not run.measurement.steady:
             factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
             of_shaft = f"{profile.shaft} " if profile.shaft else ""
             words.append(f"{of_shaft}{factor * profile.speed.min():.4g} to {factor * profile.speed.max():.4g} {unit}")
