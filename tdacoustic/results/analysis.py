@@ -14,7 +14,7 @@ from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.spectra import Spectrum
 from tdacoustic.steps import Record
-from tdacoustic.steps.provenance import versions
+from tdacoustic.steps.record import versions
 
 if TYPE_CHECKING:
     import pandas as pd

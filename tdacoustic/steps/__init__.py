@@ -7,7 +7,8 @@ under their keys. `execute` computes what the store does not hold yet.
 
 from tdacoustic.steps.execution import Outcome, execute, result_of
 from tdacoustic.steps.logfiles import LogFile, log_file
-from tdacoustic.steps.provenance import Record, lineage
+from tdacoustic.steps.provenance import lineage
+from tdacoustic.steps.record import Record
 from tdacoustic.steps.store import Store, default_store_path
 from tdacoustic.steps.task import Step, Task
 

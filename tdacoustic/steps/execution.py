@@ -18,7 +18,7 @@ from tdacoustic.errors import AnalysisError, TdacousticError
 from tdacoustic.steps.codec import canonical_json, encode
 from tdacoustic.steps.logfiles import LogFile
 from tdacoustic.steps.progress import listening
-from tdacoustic.steps.provenance import Record, versions
+from tdacoustic.steps.record import Record, versions
 from tdacoustic.steps.store import Store
 from tdacoustic.steps.task import Task
 

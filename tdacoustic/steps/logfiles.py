@@ -7,17 +7,26 @@ import json
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from tdacoustic.errors import MissingFileError
-
-if TYPE_CHECKING:
-    from tdacoustic.steps.store import Store
 
 __all__ = ["LogFile", "log_file"]
 
 _RACY_S = 2.0
 """A file changed this shortly before it was hashed could change again within one tick of its time stamp."""
+
+
+class HashMemory(Protocol):
+    """Remembers a text about a log."""
+
+    def remembered_hash(self, path: Path) -> str | None:
+        """Return what was kept, or None."""
+        ...
+
+    def remember_hash(self, path: Path, text: str) -> None:
+        """Keep a text."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -29,7 +38,7 @@ class LogFile:
     n_bytes: int
 
 
-def _remembered(store: Store, path: Path, identity: dict[str, int]) -> str | None:
+def _remembered(store: HashMemory, path: Path, identity: dict[str, int]) -> str | None:
     """Return the hash that the store remembers for a file of this identity; a damaged note is none."""
     text = store.remembered_hash(path)
     try:
@@ -42,13 +51,14 @@ def _remembered(store: Store, path: Path, identity: dict[str, int]) -> str | Non
     return sha256 if isinstance(sha256, str) else None
 
 
-def log_file(path: Path, store: Store | None = None) -> LogFile:
+def log_file(path: Path, store: HashMemory | None = None) -> LogFile:
     """Hash a log, or look its hash up where size and time stamps are as they were.
 
     Parameters
     ----------
     path : Path
-    store : Store, optional
+    store : HashMemory, optional
+        A `tdacoustic.steps.Store`.
         Remembers hashes between sessions, keyed by path, size and time of change.
 
     Raises

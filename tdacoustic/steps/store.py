@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import StoreError
 from tdacoustic.steps.codec import canonical_json, decode, encode
-from tdacoustic.steps.provenance import Record
+from tdacoustic.steps.record import Record
 
 __all__ = ["Store", "default_store_path"]
 

@@ -6,6 +6,7 @@ import glob
 import hashlib
 import json
 import os
+import platform
 import shutil
 import time
 from collections.abc import Mapping
@@ -23,6 +24,26 @@ SCHEMA = "tdacoustic-manifest/1"
 
 _LEFT_OVER_S = 3600.0
 """A staging folder in which nothing was written for this long was left by a run that was killed."""
+
+
+def _staging_mark() -> str:
+    """Return what tells one run's staging folder from another's: this machine, this process, a random part."""
+    machine = hashlib.sha256(platform.node().encode()).hexdigest()[:6]
+    return f"{machine}-{os.getpid()}-{uuid4().hex[:6]}"
+
+
+def _is_left_over(folder: Path, mark: str) -> bool:
+    """Whether the run that wrote a staging folder is gone: its process on this machine is, or it is silent for long."""
+    machine, _, rest = mark.partition("-")
+    process = rest.partition("-")[0]
+    if os.name == "posix" and machine == _staging_mark().partition("-")[0] and process.isdigit():
+        try:
+            os.kill(int(process), 0)
+        except ProcessLookupError:
+            return True
+        except OSError:
+            pass  # somebody else's, and alive
+    return time.time() - folder.stat().st_mtime > _LEFT_OVER_S
 
 
 def default_output(toml_file: Path) -> Path:
@@ -67,7 +88,7 @@ class OutputFolder:
     def __init__(self, path: Path, subject: Path, overwrite: bool = False, keep: bool = False) -> None:
         self.path = path
         whole = path.absolute() if path.name not in ("", "..") else path.resolve()  # "." and ".." name no folder
-        self.staging = whole.with_name(f".{whole.name}.{uuid4().hex[:8]}.partial")
+        self.staging = whole.with_name(f".{whole.name}.{_staging_mark()}.partial")
         self.manifest: dict[str, Any] = {}
         self._subject = _relative(subject, path)
         self._overwrite = overwrite
@@ -109,10 +130,11 @@ class OutputFolder:
         return self
 
     def _sweep(self) -> None:
-        """Take away what killed runs left beside the target long ago; a fresh one may be of a run at this moment."""
+        """Take away what killed runs left beside the target; not what another run is writing at this moment."""
         name, _ = self.staging.name.removesuffix(".partial").rsplit(".", 1)
-        for left in self.staging.parent.glob(f"{glob.escape(name)}.????????.partial"):
-            if time.time() - left.stat().st_mtime > _LEFT_OVER_S:
+        for left in self.staging.parent.glob(f"{glob.escape(name)}.*.partial"):
+            mark = left.name[len(name) + 1 :].removesuffix(".partial")
+            if "." not in mark and _is_left_over(left, mark):
                 shutil.rmtree(left, ignore_errors=True)
 
     def write_text(self, name: str, text: str) -> None:

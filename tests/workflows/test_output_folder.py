@@ -210,6 +210,25 @@ def test_left_overs_of_kills_are_swept_when_they_are_old(tmp_path, subject):
     assert sorted(path.name for path in tmp_path.glob(".*")) == sorted([fresh.name, other.name])
 
 
+@pytest.mark.skipif(os.name != "posix", reason="only there a process can be asked for without harm")
+def test_what_a_killed_run_left_is_swept_by_the_next(tmp_path, subject):
+    out = tmp_path / "out"
+    script = (
+        "import os, signal, sys; from pathlib import Path; from tdacoustic.workflows.output import OutputFolder\n"
+        "with OutputFolder(Path(sys.argv[1]), Path(sys.argv[2])) as folder:\n"
+        "    folder.write_text('a.csv', '1'); os.kill(os.getpid(), signal.SIGKILL)"
+    )
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).parents[2])}
+    subprocess.run([sys.executable, "-c", script, str(out), str(subject)], env=environment, check=False)
+    assert len(list(tmp_path.glob(".out.*.partial"))) == 1
+    with OutputFolder(out, subject) as running:  # alive: not swept by another
+        write(out, subject, {"a.csv": "2"})
+        assert running.staging.is_dir()
+        assert len(list(tmp_path.glob(".out.*.partial"))) == 1
+        running.write_text("a.csv", "3")
+    assert not list(tmp_path.glob(".out.*.partial"))
+
+
 def test_runs_at_the_same_time_give_one_whole_result(tmp_path, subject):
     out = tmp_path / "out"
     with OutputFolder(out, subject) as one:
