@@ -65,11 +65,14 @@ class FramePowerMeter:
 
     def __init__(self, plan: FramePlan, n_channels: int) -> None:
         self.plan = plan
-        shape = (n_channels, plan.n_segments, plan.n_frequencies)
-        self._density = np.zeros(shape)
-        self._frames = np.zeros(shape[:2], dtype=np.int64)
-        self._means = np.zeros(shape[:2])
+        shape = (n_channels, plan.n_segments)
+        self._density = np.full((*shape, plan.n_frequencies), np.nan, dtype=np.float32)
+        self._frames = np.zeros(shape, dtype=np.int64)
+        self._means = np.zeros(shape)
+        self._segment = 0
+        self._running = np.zeros((n_channels, plan.n_frequencies))  # of the segment in hand: small, it stays in cache
         self._window = hann(plan.frame_length)
+        self._scale = self._one_sided() / (plan.sample_rate_hz * float(np.sum(self._window**2)))
         self._scratch = np.empty(plan.frame_length)
         self._pending = np.empty((n_channels, 0))
         self._next_frame = 0
@@ -96,6 +99,9 @@ class FramePowerMeter:
 
     def _take_frame(self, frames: Array) -> None:
         segment = self.plan.segment_of(self._next_frame)
+        if segment != self._segment:
+            self._close_segment()
+            self._segment = segment
         half = 0.5 * self.plan.frame_length
         with np.errstate(invalid="ignore"):  # infinite values of both signs
             means = frames.mean(axis=1)
@@ -109,21 +115,33 @@ class FramePowerMeter:
             transform[1] += 0.5 * half * mean
             squares = transform.view(np.float64)
             np.multiply(squares, squares, out=squares)
-            self._density[channel, segment] += squares[0::2]
-            self._density[channel, segment] += squares[1::2]
+            running = self._running[channel]
+            running += squares[0::2]
+            running += squares[1::2]
             self._frames[channel, segment] += 1
             self._means[channel, segment] += mean
         self._next_frame += 1
 
+    def _one_sided(self) -> Array:
+        factor = np.full(self.plan.n_frequencies, 2.0)
+        factor[0] = 1.0
+        if self.plan.frame_length % 2 == 0:
+            factor[-1] = 1.0
+        return factor
+
+    def _close_segment(self) -> None:
+        """Put the running sums of the segment in hand where they belong, as a density."""
+        for channel, running in enumerate(self._running):
+            frames = self._frames[channel, self._segment]
+            if frames:
+                running *= self._scale
+                running /= frames
+                self._density[channel, self._segment] = running
+                running[:] = 0.0
+
     def result(self) -> SegmentPowers:
-        """Return the powers of all frames taken so far."""
-        plan = self.plan
-        one_sided = np.full(plan.n_frequencies, 2.0)
-        one_sided[0] = 1.0
-        if plan.frame_length % 2 == 0:
-            one_sided[-1] = 1.0
-        scale = one_sided / (plan.sample_rate_hz * float(np.sum(self._window**2)))
+        """Return the powers of all frames taken; nothing can be taken after."""
+        self._close_segment()
         with np.errstate(invalid="ignore", divide="ignore"):
-            density = self._density * scale / self._frames[:, :, np.newaxis]
             means = self._means / self._frames
-        return SegmentPowers(plan, density.astype(np.float32), self._frames.copy(), means)
+        return SegmentPowers(self.plan, self._density, self._frames, means)

@@ -139,8 +139,11 @@ def average_spectrum(powers: SegmentPowers, channel: int, quantity: str, si_symb
     if total == 0:
         raise AnalysisError(f"channel {name!r}: no frame without missing values")
     plan = powers.plan
-    used = frames > 0
-    density = frames[used].astype(np.float64) @ powers.density[channel, used] / total
+    density = np.zeros(plan.n_frequencies)
+    for weight, segment in zip(frames, powers.density[channel], strict=True):
+        if weight:
+            density += np.float64(weight) * segment
+    density /= total
     window = hann(plan.frame_length)
     noise_bandwidth_hz = plan.sample_rate_hz * float(np.sum(window**2)) / float(np.sum(window)) ** 2
     return Spectrum(
