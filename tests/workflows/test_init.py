@@ -12,7 +12,7 @@ from tdacoustic.ingest import bind_run
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.workflows.init import campaign_text, make_campaign, toml_string
 
-RECORDINGS = Path("/work/shared/recordings")
+RECORDINGS = Path(__file__).resolve().parents[3] / "shared" / "recordings"
 
 
 @dataclass
