@@ -18,6 +18,7 @@ from tdacoustic import __version__
 from tdacoustic.errors import TdacousticError
 
 if TYPE_CHECKING:
+    from tdacoustic.campaign import Campaign as LoadedCampaign
     from tdacoustic.results import Analysis
 
 __all__ = ["app", "main"]
@@ -72,7 +73,7 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float, int], None] | None]
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)
 
 
-def _analysed(campaign: Path, store: Path | None, jobs: int | None, quiet: bool) -> Analysis:
+def _analysed(campaign: Path | LoadedCampaign, store: Path | None, jobs: int | None, quiet: bool) -> Analysis:
     from tdacoustic.workflows.analyze import analyze
 
     with _progress(quiet) as progress:
@@ -95,10 +96,10 @@ def _measure(
     from tdacoustic.workflows.output import OutputFolder, default_output
     from tdacoustic.workflows.write import write_analysis
 
-    load_campaign(campaign)  # a wrong campaign is said before anything else
+    loaded = load_campaign(campaign)  # a wrong campaign is said before anything else
     target = out or default_output(_toml(campaign))
     folder = OutputFolder(target, _toml(campaign), overwrite)
-    analysis = _analysed(campaign, store, jobs, quiet)
+    analysis = _analysed(loaded, store, jobs, quiet)
     write_analysis(analysis, folder, command)
     _report_problems(analysis)
     return analysis, target

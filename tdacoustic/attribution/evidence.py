@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.lines import Line, local_floor
+from tdacoustic.lines import MAIN_LOBE, Line
 from tdacoustic.measured import RunMeasurement, Survey
 from tdacoustic.spectra import SegmentPowers, Spectrum
 from tdacoustic.steps import Step
@@ -16,9 +16,6 @@ from tdacoustic.steps import Step
 __all__ = ["EVIDENCE", "EvidenceSettings", "LineEvidence", "RunEvidence", "View"]
 
 Array = NDArray[np.float64]
-
-MAIN_LOBE = 2
-"""Half width of the window's main lobe, in lines of the spectrum."""
 
 
 @dataclass(frozen=True)
@@ -105,10 +102,10 @@ def gather_evidence(settings: EvidenceSettings, survey: Survey, measurement: Run
     windows = {}
     for name, component in channels:
         result = measurement.channel(name)
-        if result is not None and result.usable and result.spectrum is not None:
+        if result is not None and result.usable and result.spectrum is not None and result.floor is not None:
             raster, index = survey.of_channel(name)
             if raster.powers is not None:
-                windows[name] = _Window(name, component, raster.powers, index, result.spectrum)
+                windows[name] = _Window(name, component, raster.powers, index, result.spectrum, result.floor)
     found = []
     for receiver in settings.receivers:
         result = measurement.channel(receiver)
@@ -123,12 +120,14 @@ def gather_evidence(settings: EvidenceSettings, survey: Survey, measurement: Run
 class _Window:
     """One channel's segment powers and floor."""
 
-    def __init__(self, name: str, component: str, powers: SegmentPowers, index: int, spectrum: Spectrum) -> None:
+    def __init__(
+        self, name: str, component: str, powers: SegmentPowers, index: int, spectrum: Spectrum, floor: Array
+    ) -> None:
         self._name, self._component = name, component
         used = powers.frames[index] > 0
         self._density = powers.density[index][used]
         self._weights = powers.frames[index][used].astype(np.float64)
-        self._floor = local_floor(spectrum)
+        self._floor = floor
         self._spectrum = spectrum
 
     def view(self, line: Line, scatter: float) -> View:

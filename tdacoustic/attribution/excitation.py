@@ -107,13 +107,10 @@ class Scale:
     value : float
     error : float
         One standard deviation, relative.
-    matched : tuple of float
-        Frequencies of the lines it rests on.
     """
 
     value: float
     error: float
-    matched: tuple[float, ...]
 
 
 def observed_scale(
@@ -164,7 +161,7 @@ def observed_scale(
     ratio = float(np.sum(precision * lines[hit] / nearest) / precision.sum())
     scatter = float(np.sqrt(np.average((lines[hit] / nearest - ratio) ** 2, weights=precision)))
     error = max(scatter, float(1.0 / np.sqrt(precision.sum())), 2e-4)
-    return Scale(ratio, error, tuple(float(value) for value in lines[hit]))
+    return Scale(ratio, error)
 
 
 def _is_fundamental(lines: np.ndarray, base: np.ndarray, reach: float) -> bool:

@@ -131,7 +131,6 @@ class ThirdOctaveMeter:
         if centre.size == 0:
             raise AnalysisError(f"a rate of {sample_rate_hz:g} Hz holds no third octave from {lowest_hz:g} Hz up")
         stage_of = np.maximum(0, np.floor(np.log2(STAGE_EDGE * sample_rate_hz / high))).astype(int)
-        self._n_channels = n_channels
         self._stages = []
         for index in range(int(stage_of.max()) + 1):
             chosen = centre[stage_of == index]
