@@ -10,6 +10,7 @@ __all__ = [
     "CampaignError",
     "FleetError",
     "FormatError",
+    "GearError",
     "MissingFileError",
     "OutputError",
     "RecipeError",
@@ -44,6 +45,10 @@ class CampaignError(TdacousticError, ValueError):
 
 class FleetError(TdacousticError, ValueError):
     """A fleet file is wrong, or lacks a parameter that is needed."""
+
+
+class GearError(TdacousticError, ValueError):
+    """Gears that cannot be made or cannot mesh, or a state of them that cannot be computed."""
 
 
 class RecipeError(TdacousticError, ValueError):

@@ -22,7 +22,7 @@ def energy_mean_db(levels_db: Iterable[float]) -> float | None:
     Examples
     --------
     >>> round(energy_mean_db([80.0, 83.0]), 2)
-    81.76
+    81.75
     """
     held = list(levels_db)
     return 10.0 * math.log10(sum(10.0 ** (0.1 * level) for level in held) / len(held)) if held else None

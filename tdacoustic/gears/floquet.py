@@ -1,0 +1,73 @@
+"""Stability of a periodic motion: its Floquet multipliers."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.gears.system import GearSystem
+
+__all__ = ["floquet_multipliers", "samples_of_period"]
+
+Real = NDArray[np.float64]
+
+_FEWEST_STEPS: Final = 128
+_RADIANS_PER_STEP: Final = 0.3
+_TERMS: Final = 6
+_SUBSAMPLES: Final = 4
+
+
+def floquet_multipliers(system: GearSystem, mesh_hz: float, displacement_m: Real) -> NDArray[np.complex128]:
+    """Return the multipliers of a motion that repeats, largest first, shape (14,).
+
+    The rigid rotation is not among them: its two unit multipliers (a Jordan block) are taken out by the reduction to
+    seven coordinates. A motion whose largest multiplier is beyond 1 is not what the gear does.
+
+    Parameters
+    ----------
+    system : GearSystem
+    mesh_hz : float
+    displacement_m : ndarray, shape (periods, samples)
+        δ over the mesh periods after which it repeats, from the start of a period; the samples of a period are a
+        multiple of 4, as `samples_of_period` gives them.
+    """
+    from tdacoustic.gears.kernels import monodromy
+
+    samples = displacement_m.shape[1]
+    stiffness, touching = _mesh_of_steps(system, displacement_m)
+    damping = system.mesh_damping_n_s_per_m * (touching if system.mesh_damping == "contact" else np.ones_like(touching))
+    reduced = system.reduced
+    step_s = _SUBSAMPLES / (samples * mesh_hz)
+    matrix = monodromy(
+        stiffness, damping, step_s, reduced.direction, 1.0 / reduced.masses, reduced.stiffness, reduced.damping, _TERMS
+    )
+    values = np.linalg.eigvals(matrix)
+    return np.asarray(values[np.argsort(-np.abs(values))], dtype=np.complex128)
+
+
+def samples_of_period(system: GearSystem, mesh_hz: float) -> int:
+    """Return how many samples of a mesh period the multipliers need."""
+    turning = 2.0 * math.pi * system.fastest_hz / mesh_hz
+    return _SUBSAMPLES * max(_FEWEST_STEPS, math.ceil(turning / _RADIANS_PER_STEP))
+
+
+def _mesh_of_steps(system: GearSystem, displacement_m: Real) -> tuple[Real, Real]:
+    """Return the mean mesh stiffness of each step, none while teeth are apart, and the part of it they touch."""
+    periods, samples = displacement_m.shape
+    stiffness = system.mesh_stiffness_n_per_m * system.contact_lines.relative((np.arange(samples) + 0.5) / samples)
+    error = system.transmission_error_at(np.arange(samples) / samples)
+    touching = _part_above_zero((np.abs(displacement_m - error) - system.half_backlash_m).ravel())
+    whole = np.tile(stiffness, periods) * touching
+    return whole.reshape(-1, _SUBSAMPLES).mean(axis=1), touching.reshape(-1, _SUBSAMPLES).mean(axis=1)
+
+
+def _part_above_zero(values: Real) -> Real:
+    """Part of each interval from a sample to the next of a period in which straight lines between them are above 0."""
+    following = np.roll(values, -1)
+    above, below = np.maximum(values, following), np.minimum(values, following)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        part = above / (above - below)
+    return np.where(below > 0.0, 1.0, np.where(above <= 0.0, 0.0, part))

@@ -1,0 +1,328 @@
+"""The periodic steady state as a scalar harmonic balance in δ.
+
+Everything but the mesh force is linear and diagonal, so δ_k + H(kω) F_k[δ] = 0 for k ≠ 0 and F_0 = T1/(r1 cos β_b)
+(physics.md section 2). While the teeth stay in contact F is linear in δ and one real system of 2N + 1 unknowns is the
+answer. With separation F_k comes from samples over one period (alternating frequency-time) and Newton's method starts
+from the solution of teeth that cannot separate.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.gears.system import GearSystem
+
+__all__ = ["HarmonicSolution", "balance", "bonded_solution", "periodic_solution"]
+
+Real = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+FEWEST_HARMONICS: Final = 16
+MOST_HARMONICS: Final = 768
+TAIL: Final = 3e-5
+"""Largest error of δ by the harmonics left out, over its peak to peak, as estimated, before more are taken."""
+
+RESIDUAL: Final = 1e-10
+"""Largest residual of a solution over the static compression and the transmission error."""
+
+_NEWTON_STEPS: Final = 40
+_HALVINGS: Final = 10
+_SAMPLES_PER_HARMONIC: Final = 8
+
+
+@dataclass(frozen=True)
+class HarmonicSolution:
+    """Harmonics 0 to 2N of a periodic solution: x(t) = x_0 + 2 Re Σ x_k exp(ikωt).
+
+    The balance is solved for harmonics 0 to N; N + 1 to 2N are what the force of those makes of them.
+
+    Parameters
+    ----------
+    mesh_hz : float
+    displacement_m, force_n : ndarray of complex, shape (2N + 1,)
+        Of δ and of the mesh force F.
+    contact_part : float
+        Part of the period in which teeth touch.
+    residual : float
+        Of the balance, over its scale.
+    tail : float
+        Estimated error of δ by the harmonics that the balance leaves out, over its peak to peak.
+    """
+
+    mesh_hz: float
+    displacement_m: Complex
+    force_n: Complex
+    contact_part: float
+    residual: float
+    tail: float
+
+    @property
+    def n_harmonics(self) -> int:
+        """N, to which the balance is solved."""
+        return self.displacement_m.size // 2
+
+    @property
+    def separates(self) -> bool:
+        """Whether teeth leave each other."""
+        return self.contact_part < 1.0
+
+    def displacement_at(self, samples: int) -> Real:
+        """Return δ at `samples` equally spaced times of one period, from 0; at least 4 N + 2 of them."""
+        return np.asarray(np.fft.irfft(self.displacement_m, samples, norm="forward"))
+
+    @property
+    def dte_pp_m(self) -> float:
+        """Peak to peak of δ, from the series at 16 and more points a harmonic."""
+        values = self.displacement_at(max(1024, 16 * self.displacement_m.size))
+        return float(values.max() - values.min())
+
+
+@lru_cache(maxsize=32)
+def _differences(n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Places of harmonics k - m and k + m, k = 0..N, m = 1..N, in an array of harmonics -2N to 2N."""
+    k, m = np.arange(n + 1)[:, None], np.arange(1, n + 1)[None, :]
+    return k - m + 2 * n, k + m + 2 * n
+
+
+def _two_sided(coefficients: Complex) -> Complex:
+    return np.concatenate([coefficients[:0:-1].conj(), coefficients])
+
+
+class _Balance:
+    """The balance at one speed and load with N harmonics, in the unknowns δ_0, Re δ_k, Im δ_k.
+
+    Its residual is δ_k + H_k F_k for k >= 1 and (F_0 - T1/(r1 cos β_b)) / k̄ for k = 0, in m.
+    """
+
+    def __init__(self, system: GearSystem, mesh_hz: float, mean_force_n: float, n: int) -> None:
+        self.system, self.mesh_hz, self.mean_force_n, self.n = system, mesh_hz, mean_force_n, n
+        harmonics = np.arange(1, n + 1)
+        self.omega = 2.0 * np.pi * mesh_hz * harmonics
+        self.receptance = system.receptance_m_per_n(mesh_hz * harmonics)
+        self.weight = np.concatenate([[1.0 / system.mesh_stiffness_n_per_m + 0j], self.receptance])
+        self.stiffness = system.mesh_stiffness_n_per_m * system.contact_lines.fourier(3 * n)
+        self.error = system.transmission_error_fourier(n)
+        self.static_m = abs(mean_force_n) / system.mesh_stiffness_n_per_m
+        self.scale_m = max(self.static_m, system.transmission_error_pp_m, 1e-12)
+
+    # -------------------------------------------------------------- teeth that cannot separate
+
+    def bonded(self) -> HarmonicSolution:
+        """Solve for teeth that stay on the flank that the torque presses; whether they do is told in the result."""
+        side = math.copysign(self.system.half_backlash_m, self.mean_force_n)
+        matrix = self._jacobian(self.stiffness[: 2 * self.n + 1])
+        right = self.weight * self._product(self.error, self.n)
+        right[0] += self.mean_force_n / self.system.mesh_stiffness_n_per_m
+        compressed = self._solve(matrix, right)
+        displacement = compressed.copy()
+        displacement[0] += side
+        compression = compressed - self.error
+        force = self._product(compression, 2 * self.n)
+        residual = np.abs(self._residual_of(displacement, force[: self.n + 1])).max() / self.scale_m
+        samples = np.fft.irfft(compression, _sampling(self.n), norm="forward")
+        touching = math.copysign(1.0, self.mean_force_n) * samples
+        contact = 1.0 if touching.min() >= 0.0 else float(np.mean(touching > 0.0))
+        return self._result(displacement, force, contact, float(residual))
+
+    def _product(self, compression: Complex, highest: int) -> Complex:
+        """Harmonics 0 to `highest` of k_m(t) times a series of N harmonics."""
+        whole = np.convolve(_two_sided(self.stiffness[: highest + self.n + 1]), _two_sided(compression))
+        middle = (whole.size - 1) // 2
+        return np.asarray(whole[middle : middle + highest + 1])
+
+    # -------------------------------------------------------------- Newton's method
+
+    def newton(self, start: Complex) -> HarmonicSolution | None:
+        """Return the solution that Newton's method reaches from a start, or None where it reaches none."""
+        samples = _sampling(self.n)
+        stiffness = np.fft.irfft(self.stiffness[: min(self.stiffness.size, samples // 2)], samples, norm="forward")
+        error = self.system.transmission_error_at(np.arange(samples) / samples)
+        displacement = start
+        force, touching = self._force(displacement, stiffness, error)
+        residual = self._residual_of(displacement, force[: self.n + 1])
+        for _ in range(_NEWTON_STEPS):
+            size = float(np.abs(residual).max())
+            if size <= RESIDUAL * self.scale_m:
+                return self._result(displacement, force, float(touching.mean()), size / self.scale_m)
+            active = np.fft.rfft(stiffness * touching, norm="forward")[: 2 * self.n + 1]
+            damping = None
+            if self.system.mesh_damping == "contact":
+                damping = np.fft.rfft(self.system.mesh_damping_n_s_per_m * touching, norm="forward")[: 2 * self.n + 1]
+            try:
+                step = self._solve(self._jacobian(active, damping), -residual)
+            except np.linalg.LinAlgError:
+                return None
+            norm, part = float(np.linalg.norm(residual)), 1.0
+            for _ in range(_HALVINGS):
+                trial = displacement + part * step
+                force, touching = self._force(trial, stiffness, error)
+                residual = self._residual_of(trial, force[: self.n + 1])
+                if np.linalg.norm(residual) < (1.0 - 1e-3 * part) * norm:
+                    break
+                part *= 0.5
+            else:
+                return None
+            displacement = trial
+        return None
+
+    def _force(self, displacement: Complex, stiffness: Real, error: Real) -> tuple[Complex, NDArray[np.bool_]]:
+        """Harmonics 0 to 2N of the mesh force, without the damping that always acts, and where teeth touch."""
+        samples = stiffness.size
+        gap = np.fft.irfft(displacement, samples, norm="forward") - error
+        half = self.system.half_backlash_m
+        compression = gap - np.clip(gap, -half, half)
+        touching = compression != 0.0
+        force = stiffness * compression
+        if self.system.mesh_damping == "contact":
+            velocity = np.concatenate([[0.0], 1j * self.omega * displacement[1:]])
+            speed = np.fft.irfft(velocity, samples, norm="forward")
+            force += self.system.mesh_damping_n_s_per_m * speed * touching
+        return np.fft.rfft(force, norm="forward")[: 2 * self.n + 1], touching
+
+    # -------------------------------------------------------------- residual, Jacobian, result
+
+    @property
+    def _damping_always(self) -> bool:
+        return self.system.mesh_damping == "always"
+
+    def _residual_of(self, displacement: Complex, force: Complex) -> Complex:
+        residual = self.weight * force
+        residual[1:] += displacement[1:]
+        if self._damping_always:
+            residual[1:] += self.receptance * 1j * self.omega * self.system.mesh_damping_n_s_per_m * displacement[1:]
+        residual[0] = (force[0] - self.mean_force_n) / self.system.mesh_stiffness_n_per_m
+        return residual
+
+    def _jacobian(self, stiffness: Complex, damping: Complex | None = None) -> Real:
+        """Derivative of the residual by the unknowns, for the harmonics 0 to 2N of a stiffness and a damping."""
+        n = self.n
+        minus, plus = _differences(n)
+        two_sided = _two_sided(stiffness)
+        below, above = two_sided[minus], two_sided[plus]
+        by_real, by_imaginary = below + above, 1j * (below - above)
+        if damping is not None:
+            two_sided = _two_sided(damping)
+            below, above = 1j * self.omega * two_sided[minus], 1j * self.omega * two_sided[plus]
+            by_real, by_imaginary = by_real + below - above, by_imaginary + 1j * (below + above)
+        weight = self.weight[:, None]
+        by_real, by_imaginary, by_mean = weight * by_real, weight * by_imaginary, self.weight * stiffness[: n + 1]
+        own = np.ones(n, dtype=np.complex128)
+        if self._damping_always:
+            own += self.receptance * 1j * self.omega * self.system.mesh_damping_n_s_per_m
+        diagonal = np.arange(n)
+        by_real[diagonal + 1, diagonal] += own
+        by_imaginary[diagonal + 1, diagonal] += 1j * own
+        matrix = np.empty((2 * n + 1, 2 * n + 1))
+        matrix[: n + 1, 0], matrix[n + 1 :, 0] = by_mean.real, by_mean.imag[1:]
+        matrix[: n + 1, 1 : n + 1], matrix[n + 1 :, 1 : n + 1] = by_real.real, by_real.imag[1:]
+        matrix[: n + 1, n + 1 :], matrix[n + 1 :, n + 1 :] = by_imaginary.real, by_imaginary.imag[1:]
+        return matrix
+
+    def _solve(self, matrix: Real, right: Complex) -> Complex:
+        found = np.linalg.solve(matrix, np.concatenate([right.real, right.imag[1:]]))
+        solution = found[: self.n + 1].astype(np.complex128)
+        solution[1:] += 1j * found[self.n + 1 :]
+        return solution
+
+    def _result(self, displacement: Complex, force: Complex, contact: float, residual: float) -> HarmonicSolution:
+        beyond = np.arange(self.n + 1, 2 * self.n + 1)
+        receptance = self.system.receptance_m_per_n(self.mesh_hz * beyond)
+        whole = np.concatenate([displacement, -receptance * force[self.n + 1 :]])
+        total = force.copy()
+        if self._damping_always:
+            omega = 2.0 * np.pi * self.mesh_hz * np.arange(2 * self.n + 1)
+            total += 1j * omega * self.system.mesh_damping_n_s_per_m * whole
+        # What the harmonics beyond N would do to δ if they were let back into the force: their size times the
+        # stiffness' part in what answers a force there.
+        largest = float(np.abs(displacement[1:]).max())
+        feedback = float(np.abs(receptance).max()) * self.system.mesh_stiffness_n_per_m
+        tail = float(np.abs(whole[self.n + 1 :]).sum()) / largest * min(1.0, feedback) if largest > 0.0 else 0.0
+        return HarmonicSolution(self.mesh_hz, whole, total, contact, residual, tail)
+
+
+def _sampling(n: int) -> int:
+    """Samples of one period for N harmonics: a power of two."""
+    return 1 << math.ceil(math.log2(_SAMPLES_PER_HARMONIC * n))
+
+
+def balance(
+    system: GearSystem, mesh_hz: float, mean_force_n: float, n_harmonics: int, start: Complex | None = None
+) -> HarmonicSolution | None:
+    """Return the periodic solution with a given number of harmonics, or None where Newton's method finds none.
+
+    Parameters
+    ----------
+    system : GearSystem
+    mesh_hz : float
+        Above zero.
+    mean_force_n : float
+        F_0, not zero.
+    n_harmonics : int
+        N, at least the harmonics of the transmission error.
+    start : ndarray of complex, optional
+        Harmonics of δ from which Newton's method starts; more than N are cut, fewer are filled with zeros. Default:
+        teeth that cannot separate, whose solution is returned at once where they do not.
+    """
+    held = _Balance(system, mesh_hz, mean_force_n, n_harmonics)
+    if start is None:
+        bonded = held.bonded()
+        if not bonded.separates:
+            return bonded
+        start = bonded.displacement_m
+    fitted = np.zeros(n_harmonics + 1, dtype=np.complex128)
+    common = min(start.size, n_harmonics + 1)
+    fitted[:common] = start[:common]
+    return held.newton(fitted)
+
+
+def bonded_solution(system: GearSystem, mesh_hz: float, mean_force_n: float) -> HarmonicSolution:
+    """Return the motion of teeth that cannot separate, with few harmonics: where Newton's method starts."""
+    return _Balance(system, mesh_hz, mean_force_n, max(FEWEST_HARMONICS, 2 * len(system.transmission_error_m))).bonded()
+
+
+def periodic_solution(
+    system: GearSystem, mesh_hz: float, mean_force_n: float, start: Complex | None = None
+) -> HarmonicSolution | None:
+    """Return the periodic solution with as many harmonics as it needs, or None where none is found.
+
+    Their number is estimated from the stiffness series and doubled until the tail is small enough; a solution whose
+    tail is not small with `MOST_HARMONICS` is not returned.
+
+    Parameters
+    ----------
+    system, mesh_hz, mean_force_n, start
+        As of `balance`.
+    """
+    n = _harmonics_needed(system, mesh_hz, mean_force_n)
+    while n <= MOST_HARMONICS:
+        found = balance(system, mesh_hz, mean_force_n, n, start)
+        if found is None:
+            return None
+        if found.tail <= TAIL:
+            return found
+        start = found.displacement_m if found.separates or start is not None else None
+        n *= 2
+    return None
+
+
+def _harmonics_needed(system: GearSystem, mesh_hz: float, mean_force_n: float) -> int:
+    """Return how many harmonics the stiffness series under the mean force asks for.
+
+    An estimate that spares a solution with too few; the tail of what is found decides.
+    """
+    k = np.arange(1, MOST_HARMONICS + 1)
+    force = np.abs(mean_force_n * system.contact_lines.fourier(MOST_HARMONICS)[1:])
+    receptance = np.abs(system.receptance_m_per_n(mesh_hz * k))
+    added = receptance * force
+    feedback = np.minimum(1.0, receptance * system.mesh_stiffness_n_per_m)
+    beyond = np.cumsum(added[::-1])[::-1] * feedback
+    swing = 0.25 * max(abs(mean_force_n) / system.mesh_stiffness_n_per_m, system.transmission_error_pp_m)
+    too_much = np.flatnonzero(beyond > TAIL * swing)
+    enough = int(too_much[-1]) + 2 if too_much.size else 1
+    return min(max(FEWEST_HARMONICS, 2 * len(system.transmission_error_m), enough), MOST_HARMONICS)
