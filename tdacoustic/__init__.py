@@ -9,7 +9,8 @@ From a log to a plotted spectrum with its lines::
     lines = td.find_lines(spectrum)
     td.plot(spectrum, lines)
 
-From a campaign to its tables as pandas frames: ``td.analyze("campaign.toml").tables["lines"]``.
+From a campaign to its tables as pandas frames: ``td.analyze("campaign.toml").tables["lines"]``; from a fleet to
+those of its model: ``td.predict("fleet.toml").tables["conditions"]``.
 """
 
 from importlib import import_module
@@ -18,12 +19,15 @@ from typing import Any
 __version__ = "0.1.0"
 
 _PUBLIC = {
+    "DriveModel": "tdacoustic.drive",
     "TdacousticError": "tdacoustic.errors",
     "analyze": "tdacoustic.workflows.analyze",
     "find_families": "tdacoustic.lines",
     "find_lines": "tdacoustic.lines",
     "load_campaign": "tdacoustic.campaign",
+    "load_fleet": "tdacoustic.fleet",
     "plot": "tdacoustic.workflows.interactive",
+    "predict": "tdacoustic.workflows.predict",
     "read": "tdacoustic.workflows.interactive",
     "scan": "tdacoustic.formats",
     "spectrum": "tdacoustic.workflows.interactive",

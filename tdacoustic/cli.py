@@ -190,6 +190,34 @@ def analyze(
 
 
 @app.command()
+def predict(
+    fleet: Annotated[Path, typer.Argument(help="fleet.toml, or the folder it is in.", show_default=False)],
+    out: Annotated[
+        Path | None, typer.Option("-o", "--out", help="Output folder.", show_default="reports/<folder of the fleet>")
+    ] = None,
+    overwrite: Overwrite = False,
+    store: StorePath = None,
+    quiet: Quiet = False,
+) -> None:
+    """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise."""
+    from tdacoustic.fleet import load_fleet
+    from tdacoustic.workflows.output import OutputFolder, default_output
+    from tdacoustic.workflows.predict import predict as compute
+    from tdacoustic.workflows.write import write_prediction
+
+    loaded = load_fleet(fleet)  # a wrong fleet is said before anything else
+    target = out or default_output(loaded.path)
+    folder = OutputFolder(target, loaded.path, overwrite)
+    with _progress(quiet) as progress:
+        result = compute(loaded, store, progress)
+    write_prediction(result, folder)
+    for doubt in result.prediction.doubts:
+        _say(f"warning: {doubt}")
+    if not quiet:
+        print(target / "report.html")
+
+
+@app.command()
 def run(
     campaign: Campaign,
     out: Out = None,

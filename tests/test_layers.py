@@ -25,16 +25,17 @@ ALLOWED = {
     "quality": "lines spectra speed recording units errors",
     "steps": "errors",
     "gears": "errors",
+    "drive": "gears fleet steps errors",
     "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
     "attribution": "measured quality lines spectra speed campaign fleet steps units errors",
-    "results": "attribution measured campaign fleet spectra steps errors",
-    "tables": "attribution measured campaign fleet units errors",
-    "reporting": "results tables attribution measured campaign fleet quality lines spectra speed recording units "
-    "errors __version__",
+    "results": "drive attribution measured campaign fleet spectra steps errors",
+    "tables": "drive gears attribution measured campaign fleet units errors",
+    "reporting": "results tables drive gears attribution measured campaign fleet quality lines spectra speed recording "
+    "units errors __version__",
     "synthesis": "errors",
-    "workflows": "reporting tables results attribution measured steps quality lines spectra speed ingest campaign "
-    "fleet toml_models formats recording units errors",
-    "cli": "workflows synthesis results campaign errors __version__",
+    "workflows": "reporting tables results drive gears attribution measured steps quality lines spectra speed ingest "
+    "campaign fleet toml_models formats recording units errors",
+    "cli": "workflows synthesis results campaign fleet errors __version__",
     "__main__": "cli",
     "__init__": "",
 }

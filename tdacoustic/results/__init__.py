@@ -1,5 +1,6 @@
 """What the commands found, as reports, files and notebooks read it."""
 
 from tdacoustic.results.analysis import Analysis, LogInput
+from tdacoustic.results.fleet_prediction import FleetPrediction
 
-__all__ = ["Analysis", "LogInput"]
+__all__ = ["Analysis", "FleetPrediction", "LogInput"]

@@ -9,7 +9,7 @@ from importlib import metadata
 
 __all__ = ["Record", "versions"]
 
-_RECORDED = ("tdacoustic", "numpy", "scipy", "pandas", "h5py", "soundfile", "pyuff", "PyOctaveBand")
+_RECORDED = ("tdacoustic", "numpy", "scipy", "pandas", "h5py", "soundfile", "pyuff", "PyOctaveBand", "numba")
 
 
 @dataclass(frozen=True)

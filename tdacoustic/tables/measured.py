@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from tdacoustic.attribution import Dominance, RunKinematics, SourceLine
 from tdacoustic.campaign import Campaign
 from tdacoustic.measured.levels import ConditionLevels, RunLevel
 from tdacoustic.measured.results import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
-from tdacoustic.tables.schema import COLUMNS, TEXT_COLUMNS
+from tdacoustic.tables.frames import Row, frame_of
+from tdacoustic.tables.schema import COLUMNS
 from tdacoustic.units import level_db
 
 if TYPE_CHECKING:
     import pandas as pd
 
 __all__ = ["measured_tables"]
-
-Row = dict[str, Any]
 
 
 def measured_tables(
@@ -55,23 +54,7 @@ def measured_tables(
     }
     if kinematics:
         rows["kinematics"] = _kinematic_rows(tested, kinematics)
-    return {name: _frame(name, table) for name, table in rows.items()}
-
-
-def _frame(name: str, rows: Iterable[Row]) -> pd.DataFrame:
-    import pandas as pd
-
-    columns = COLUMNS[name].split()
-    held = list(rows)
-    data = {column: [row.get(column) for row in held] for column in columns}
-    frame = pd.DataFrame({column: pd.Series(values, dtype=_dtype(column, values)) for column, values in data.items()})
-    return frame[columns]
-
-
-def _dtype(column: str, values: Sequence[Any]) -> str:
-    if column in TEXT_COLUMNS:
-        return "str"
-    return "bool" if values and all(isinstance(value, bool) for value in values) else "float64"
+    return {name: frame_of(name, table) for name, table in rows.items()}
 
 
 def _quality_rows(campaign: Campaign, runs: Sequence[MeasuredRun]) -> Iterator[Row]:

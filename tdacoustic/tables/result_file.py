@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from tdacoustic.measured.results import ChannelResult, RunMeasurement
 from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.tables.hdf5_groups import SCHEMA, group_of, put
 
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["SCHEMA", "write_result_file"]
-
-SCHEMA = "tdacoustic-result-file/1"
+__all__ = ["write_result_file"]
 
 
 def write_result_file(path: Path, name: str, origin: str, runs: Sequence[MeasuredRun]) -> None:
@@ -42,40 +39,23 @@ def write_result_file(path: Path, name: str, origin: str, runs: Sequence[Measure
         file.attrs["name"] = name
         file.attrs["origin"] = origin
         for run in runs:
-            group = _group(file, run.name)
+            group = group_of(file, run.name)
             group.attrs["condition"] = run.run.condition or ""
             group.attrs["kind"] = run.run.kind
             if run.measurement is not None:
                 _write_run(group, run.measurement)
 
 
-def _group(parent: h5py.Group, name: str) -> h5py.Group:
-    """Make the group of a run or channel."""
-    shown = name.replace("/", "_")
-    while shown in parent:
-        shown += "_"
-    group = parent.create_group(shown)
-    group.attrs["name"] = name
-    return group
-
-
-def _put(group: h5py.Group, name: str, values: Any, unit: str) -> None:
-    array = np.asarray(values, dtype=np.float64)
-    options = {"compression": "gzip", "shuffle": True} if array.size > 1024 else {}
-    dataset = group.create_dataset(name, data=array, track_times=False, **options)
-    dataset.attrs["unit"] = unit
-
-
 def _write_run(group: h5py.Group, measurement: RunMeasurement) -> None:
     group.attrs["steady"] = measurement.steady
     for profile in measurement.speed.profiles:
-        speed = _group(group.require_group("speed"), profile.channel)
+        speed = group_of(group.require_group("speed"), profile.channel)
         speed.attrs["shaft"] = profile.shaft or ""
-        _put(speed, "time_s", profile.times_s, "s")
-        _put(speed, "speed", profile.speed, profile.si_symbol)
+        put(speed, "time_s", profile.times_s, "s")
+        put(speed, "speed", profile.speed, profile.si_symbol)
     channels = group.create_group("channels")
     for result in measurement.channels:
-        _write_channel(_group(channels, result.channel), result)
+        _write_channel(group_of(channels, result.channel), result)
 
 
 def _write_channel(group: h5py.Group, result: ChannelResult) -> None:
@@ -87,16 +67,16 @@ def _write_channel(group: h5py.Group, result: ChannelResult) -> None:
         group.attrs["quantity"] = spectrum.quantity
         group.attrs["noise_bandwidth_hz"] = spectrum.noise_bandwidth_hz
         group.attrs["averages"] = spectrum.averages
-        _put(group, "frequency_hz", spectrum.frequencies_hz, "Hz")
-        _put(group, "density", spectrum.density, unit)
+        put(group, "frequency_hz", spectrum.frequencies_hz, "Hz")
+        put(group, "density", spectrum.density, unit)
         if result.floor is not None:
-            _put(group, "floor_density", result.floor, unit)
-        _put(group, "line_frequency_hz", [line.frequency_hz for line in result.lines], "Hz")
-        _put(group, "line_rms", [line.rms for line in result.lines], spectrum.si_symbol)
+            put(group, "floor_density", result.floor, unit)
+        put(group, "line_frequency_hz", [line.frequency_hz for line in result.lines], "Hz")
+        put(group, "line_rms", [line.rms for line in result.lines], spectrum.si_symbol)
     if result.bands:
-        _put(group, "band_hz", [band.nominal_hz for band in result.bands], "Hz")
-        _put(group, "band_mean_square", [band.mean_square for band in result.bands], "SI^2")
+        put(group, "band_hz", [band.nominal_hz for band in result.bands], "Hz")
+        put(group, "band_mean_square", [band.mean_square for band in result.bands], "SI^2")
     if result.map is not None:
-        _put(group, "map_time_s", result.map.times_s, "s")
-        _put(group, "map_frequency_hz", result.map.frequencies_hz, "Hz")
-        _put(group, "map_density", result.map.density, "SI^2/Hz")
+        put(group, "map_time_s", result.map.times_s, "s")
+        put(group, "map_frequency_hz", result.map.frequencies_hz, "Hz")
+        put(group, "map_density", result.map.density, "SI^2/Hz")

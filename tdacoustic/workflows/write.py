@@ -1,4 +1,4 @@
-"""Results of the measured side as files."""
+"""Results as files."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from tdacoustic.workflows.output import OutputFolder
 
 if TYPE_CHECKING:
-    from tdacoustic.results import Analysis
+    from tdacoustic.results import Analysis, FleetPrediction
 
-__all__ = ["write_analysis", "write_check"]
+__all__ = ["write_analysis", "write_check", "write_prediction"]
 
 
 def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> None:
@@ -62,3 +62,36 @@ def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
         "versions": analysis.versions,
         "problems": list(analysis.problems),
     }
+
+
+def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
+    """Write tables, ``result.h5`` and ``report.html`` of a prediction into an output folder.
+
+    Parameters
+    ----------
+    result : FleetPrediction
+    folder : OutputFolder
+        Not entered yet.
+    """
+    from tdacoustic.reporting.html import render_html
+    from tdacoustic.reporting.predicted_report import predicted_report
+    from tdacoustic.tables import csv_text
+    from tdacoustic.tables.prediction_file import write_prediction_file
+
+    fleet = result.fleet
+    with folder:
+        for name, table in result.tables.items():
+            folder.write_text(f"{name}.csv", csv_text(table))
+        highest_hz = fleet.radiation.max_frequency_hz.value
+        write_prediction_file(folder.staging / "result.h5", fleet.name, result.prediction, highest_hz)
+        folder.write_text("report.html", render_html(predicted_report(result)))
+        folder.manifest = {
+            "command": "predict",
+            "fleet": {"name": fleet.name},
+            "inputs": [
+                {"file": fleet.path.name, "sha256": result.sha256, "bytes": fleet.path.stat().st_size, "format": "TOML"}
+            ],
+            "steps": sorted({f"{record.step}/{record.version}" for _, record in result.records}),
+            "versions": result.versions,
+            "problems": list(result.prediction.doubts),
+        }

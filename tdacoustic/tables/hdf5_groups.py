@@ -1,0 +1,32 @@
+"""Groups and arrays of ``result.h5``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import h5py
+
+__all__ = ["SCHEMA", "group_of", "put"]
+
+SCHEMA = "tdacoustic-result-file/1"
+
+
+def group_of(parent: h5py.Group, name: str) -> h5py.Group:
+    """Make the group of a run, channel or condition."""
+    shown = name.replace("/", "_")
+    while shown in parent:
+        shown += "_"
+    group = parent.create_group(shown)
+    group.attrs["name"] = name
+    return group
+
+
+def put(group: h5py.Group, name: str, values: Any, unit: str) -> None:
+    """Write an array with its unit."""
+    array = np.asarray(values, dtype=np.float64)
+    options = {"compression": "gzip", "shuffle": True} if array.size > 1024 else {}
+    dataset = group.create_dataset(name, data=array, track_times=False, **options)
+    dataset.attrs["unit"] = unit
