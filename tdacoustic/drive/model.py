@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
 
-from tdacoustic.drive.conditions import WHEEL_DRIVES, Condition, conditions_of
+from tdacoustic.drive.conditions import Condition, conditions_of
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
 from tdacoustic.drive.prediction import GearState, HelixCase, Prediction
 from tdacoustic.errors import FleetError, GearError
@@ -94,31 +94,48 @@ class DriveModel:
         return tuple(cases)
 
     def _doubts(self, states: tuple[GearState, ...], helix: tuple[HelixCase, ...]) -> Iterator[str]:
-        yield from (f"mesh stiffness: {doubt}" for doubt in self.unit.stiffness.doubts)
-        operation = self.fleet.operation
-        law = operation.torque.value.replace("_", " ")
-        if operation.mode.value == "traction" and any(state.condition.torque_n_m < 0.0 for state in states):
-            yield "the mode is traction, but the torque is below zero: the wheelset drives the motor"
-        if operation.mode.value in WHEEL_DRIVES and any(state.condition.torque_n_m < 0.0 for state in states):
-            yield (
-                f"the mode is {operation.mode.value}: the wheelset drives, and the torque of the law ({law}) is taken "
-                "as one against the motor, on the other flanks of the teeth"
-            )
-        low = [state for state in states if self.unit.line_load_n_per_m(state.condition.torque_n_m) < LOW_LOAD_N_PER_M]
+        yield from _stiffness_doubts(self.unit, helix)
+        yield from self._mode_doubts(states)
+        loads = [self.unit.line_load_n_per_m(state.condition.torque_n_m) for state in states]
+        low = [pair for pair in zip(states, loads, strict=True) if 0.0 < pair[1] < LOW_LOAD_N_PER_M]
         if low:
-            least = min(self.unit.line_load_n_per_m(state.condition.torque_n_m) for state in low)
+            least = min(load for _, load in low)
             yield (
-                f"condition {_names(low)}: the load on the teeth is below 100 N/mm (down to {1e-3 * least:.3g} N/mm), "
-                "where ISO 6336-1 lowers the mesh stiffness in proportion; here it is not lowered"
+                f"{_conditions([state for state, _ in low])}: the load on the teeth is below 100 N/mm (down to "
+                f"{1e-3 * least:.3g} N/mm), where ISO 6336-1 lowers the mesh stiffness in proportion; here it is not "
+                "lowered"
             )
+        by_text: dict[str, list[GearState]] = {}
         for state in (*states, *(case.gears for case in helix)):
             doubt = _doubt_of(state)
             if doubt is not None:
-                yield f"condition {state.condition.name}: {doubt}"
+                by_text.setdefault(doubt, []).append(state)
+        yield from (f"{_conditions(held)}: {doubt}" for doubt, held in by_text.items())
+
+    def _mode_doubts(self, states: tuple[GearState, ...]) -> Iterator[str]:
+        operation = self.fleet.operation
+        mode, law = operation.mode.value, operation.torque.value.replace("_", " ")
+        if not any(state.condition.torque_n_m < 0.0 for state in states):
+            return
+        if mode == "traction":
+            yield "the mode is traction, but the torque is below zero: the wheelset drives the motor"
+        else:
+            yield (
+                f"the mode is {mode}: the wheelset drives, and the torque of the law ({law}) is taken as one against "
+                "the motor, on the other flanks of the teeth"
+            )
 
 
-def _names(states: list[GearState]) -> str:
-    return ", ".join(state.condition.name for state in states)
+def _stiffness_doubts(unit: GearUnit, helix: tuple[HelixCase, ...]) -> Iterator[str]:
+    yield from (f"mesh stiffness: {doubt}" for doubt in unit.stiffness.doubts)
+    for case in helix:
+        beyond = [doubt for doubt in case.unit.stiffness.doubts if not doubt.startswith("transverse contact ratio")]
+        yield from (f"mesh stiffness at {case.helix_angle_deg:g}°: {doubt}" for doubt in beyond)
+
+
+def _conditions(states: list[GearState]) -> str:
+    names = ", ".join(state.condition.name.replace(", ", " at ") for state in states)
+    return f"condition{'s' if len(states) > 1 else ''} {names}"
 
 
 def _doubt_of(state: GearState) -> str | None:

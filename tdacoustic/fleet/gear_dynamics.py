@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from tdacoustic.fleet.parameter import Parameter, default
-from tdacoustic.fleet.values import Pair, Triple
-from tdacoustic.toml_models import NonNegative, Table
+from tdacoustic.fleet.values import DampingRatio, Pair, Triple
+from tdacoustic.toml_models import Table
 
 __all__ = ["GearDynamics"]
 
@@ -20,8 +20,9 @@ class GearDynamics(Table):
     pinion_bearing_stiffness_n_per_m, wheel_bearing_stiffness_n_per_m : Parameter of (float, float, float) or None
         Total of a gear's bearings.
     bearing_damping_ratio : Parameter of float or None
-        Per direction.
+        Per direction, c = 2 ζ √(k m), from 0 to 1.
     mesh_damping_ratio : Parameter of float or None
+        c_m = 2 ζ √(k̄ m_e), from 0 to 1.
     mesh_damping : Parameter of str
         ``"always"`` as printed in the paper, or ``"contact"``: only while teeth touch.
     """
@@ -30,6 +31,6 @@ class GearDynamics(Table):
     inertia_kg_m2: Parameter[Pair] | None = None
     pinion_bearing_stiffness_n_per_m: Parameter[Triple] | None = None
     wheel_bearing_stiffness_n_per_m: Parameter[Triple] | None = None
-    bearing_damping_ratio: Parameter[NonNegative] | None = None
-    mesh_damping_ratio: Parameter[NonNegative] | None = None
+    bearing_damping_ratio: Parameter[DampingRatio] | None = None
+    mesh_damping_ratio: Parameter[DampingRatio] | None = None
     mesh_damping: Parameter[Literal["always", "contact"]] = default("always")

@@ -14,6 +14,7 @@ from tdacoustic.toml_models import Positive, shown
 
 __all__ = [
     "Angle",
+    "DampingRatio",
     "FluxDensities",
     "LossFactor",
     "OverSpeed",
@@ -38,6 +39,9 @@ Point = tuple[float, float, float]
 
 Angle = Annotated[float, Field(ge=0.0, le=45.0)]
 """A helix angle in degrees; the hand of the helix is not stated."""
+
+DampingRatio = Annotated[float, Field(ge=0.0, le=1.0)]
+"""Over critical damping."""
 
 LossFactor = Annotated[float, Field(gt=0.0, le=1.0)]
 """Of a structure; never zero, which would make it singular at resonance."""
