@@ -36,11 +36,14 @@ def floquet_multipliers(system: GearSystem, mesh_hz: float, displacement_m: Real
     """
     from tdacoustic.gears.kernels import monodromy
 
-    samples = displacement_m.shape[1]
+    sample_s = 1.0 / (displacement_m.shape[1] * mesh_hz)
+    step_s = _SUBSAMPLES * sample_s
     stiffness, touching = _mesh_of_steps(system, displacement_m)
-    damping = system.mesh_damping_n_s_per_m * (touching if system.mesh_damping == "contact" else np.ones_like(touching))
+    damping = np.full(touching.size, system.mesh_damping_n_s_per_m)
+    if system.mesh_damping == "contact":
+        damping *= touching
+        stiffness += _kicks(system, displacement_m, sample_s) / step_s
     reduced = system.reduced
-    step_s = _SUBSAMPLES / (samples * mesh_hz)
     matrix = monodromy(
         stiffness, damping, step_s, reduced.direction, 1.0 / reduced.masses, reduced.stiffness, reduced.damping, _TERMS
     )
@@ -62,6 +65,27 @@ def _mesh_of_steps(system: GearSystem, displacement_m: Real) -> tuple[Real, Real
     touching = _part_above_zero((np.abs(displacement_m - error) - system.half_backlash_m).ravel())
     whole = np.tile(stiffness, periods) * touching
     return whole.reshape(-1, _SUBSAMPLES).mean(axis=1), touching.reshape(-1, _SUBSAMPLES).mean(axis=1)
+
+
+def _kicks(system: GearSystem, displacement_m: Real, sample_s: float) -> Real:
+    """Return what a damper that needs contact adds to the time integral of the stiffness of each step, in N s/m.
+
+    As teeth meet at the speed δ' the force jumps by c_m δ'; a motion shifted by dδ meets them dδ/(δ' - e') earlier. So
+    the linearised motion gets c_m δ'/(δ' - e') dδ as an impulse (the saltation matrix of the switch), and its negative
+    as they part.
+    """
+    samples = displacement_m.shape[1]
+    error = np.tile(system.transmission_error_at(np.arange(samples) / samples), displacement_m.shape[0])
+    displacement = displacement_m.ravel()
+    gap = np.abs(displacement - error) - system.half_backlash_m
+    meets = (gap <= 0.0) & (np.roll(gap, -1) > 0.0)
+    parts = (gap > 0.0) & (np.roll(gap, -1) <= 0.0)
+    speed = (np.roll(displacement, -1) - displacement) / sample_s
+    closing = speed - (np.roll(error, -1) - error) / sample_s
+    with np.errstate(divide="ignore", invalid="ignore"):
+        kick = np.where(meets | parts, system.mesh_damping_n_s_per_m * speed / closing, 0.0)
+    kick = np.where(parts, -kick, kick)
+    return np.asarray(np.where(np.isfinite(kick), kick, 0.0).reshape(-1, _SUBSAMPLES).sum(axis=1))
 
 
 def _part_above_zero(values: Real) -> Real:

@@ -108,6 +108,8 @@ class _Balance:
         self.weight = np.concatenate([[1.0 / system.mesh_stiffness_n_per_m + 0j], self.receptance])
         self.stiffness = system.mesh_stiffness_n_per_m * system.contact_lines.fourier(3 * n)
         self.error = system.transmission_error_fourier(n)
+        self.damping = system.mesh_damping_n_s_per_m
+        self.needs_contact = system.mesh_damping == "contact"
         self.static_m = abs(mean_force_n) / system.mesh_stiffness_n_per_m
         self.scale_m = max(self.static_m, system.transmission_error_pp_m, 1e-12)
 
@@ -116,7 +118,7 @@ class _Balance:
     def bonded(self) -> HarmonicSolution:
         """Solve for teeth that stay on the flank that the torque presses; whether they do is told in the result."""
         side = math.copysign(self.system.half_backlash_m, self.mean_force_n)
-        matrix = self._jacobian(self.stiffness[: 2 * self.n + 1])
+        matrix = self._jacobian(self.stiffness[: 2 * self.n + 1], self.damping)
         right = self.weight * self._product(self.error, self.n)
         right[0] += self.mean_force_n / self.system.mesh_stiffness_n_per_m
         compressed = self._solve(matrix, right)
@@ -124,11 +126,11 @@ class _Balance:
         displacement[0] += side
         compression = compressed - self.error
         force = self._product(compression, 2 * self.n)
-        residual = np.abs(self._residual_of(displacement, force[: self.n + 1])).max() / self.scale_m
+        residual = np.abs(self._residual_of(displacement, force[: self.n + 1], self.damping)).max() / self.scale_m
         samples = np.fft.irfft(compression, _sampling(self.n), norm="forward")
         touching = math.copysign(1.0, self.mean_force_n) * samples
         contact = 1.0 if touching.min() >= 0.0 else float(np.mean(touching > 0.0))
-        return self._result(displacement, force, contact, float(residual))
+        return self._result(displacement, force, self.damping, contact, float(residual))
 
     def _product(self, compression: Complex, highest: int) -> Complex:
         """Harmonics 0 to `highest` of k_m(t) times a series of N harmonics."""
@@ -143,26 +145,25 @@ class _Balance:
         samples = _sampling(self.n)
         stiffness = np.fft.irfft(self.stiffness[: min(self.stiffness.size, samples // 2)], samples, norm="forward")
         error = self.system.transmission_error_at(np.arange(samples) / samples)
+        always = 0.0 if self.needs_contact else self.damping
         displacement = start
         force, touching = self._force(displacement, stiffness, error)
-        residual = self._residual_of(displacement, force[: self.n + 1])
+        residual = self._residual_of(displacement, force[: self.n + 1], always)
         for _ in range(_NEWTON_STEPS):
             size = float(np.abs(residual).max())
             if size <= RESIDUAL * self.scale_m:
-                return self._result(displacement, force, float(touching.mean()), size / self.scale_m)
+                return self._result(displacement, force, always, float(touching.mean()), size / self.scale_m)
             active = np.fft.rfft(stiffness * touching, norm="forward")[: 2 * self.n + 1]
-            damping = None
-            if self.system.mesh_damping == "contact":
-                damping = np.fft.rfft(self.system.mesh_damping_n_s_per_m * touching, norm="forward")[: 2 * self.n + 1]
+            contact = np.fft.rfft(touching, norm="forward")[: 2 * self.n + 1] if self.needs_contact else None
             try:
-                step = self._solve(self._jacobian(active, damping), -residual)
+                step = self._solve(self._jacobian(active, always, contact), -residual)
             except np.linalg.LinAlgError:
                 return None
             norm, part = float(np.linalg.norm(residual)), 1.0
             for _ in range(_HALVINGS):
                 trial = displacement + part * step
                 force, touching = self._force(trial, stiffness, error)
-                residual = self._residual_of(trial, force[: self.n + 1])
+                residual = self._residual_of(trial, force[: self.n + 1], always)
                 if np.linalg.norm(residual) < (1.0 - 1e-3 * part) * norm:
                     break
                 part *= 0.5
@@ -179,42 +180,42 @@ class _Balance:
         compression = gap - np.clip(gap, -half, half)
         touching = compression != 0.0
         force = stiffness * compression
-        if self.system.mesh_damping == "contact":
+        if self.needs_contact:
             velocity = np.concatenate([[0.0], 1j * self.omega * displacement[1:]])
             speed = np.fft.irfft(velocity, samples, norm="forward")
-            force += self.system.mesh_damping_n_s_per_m * speed * touching
+            force += self.damping * speed * touching
         return np.fft.rfft(force, norm="forward")[: 2 * self.n + 1], touching
 
     # -------------------------------------------------------------- residual, Jacobian, result
 
-    @property
-    def _damping_always(self) -> bool:
-        return self.system.mesh_damping == "always"
-
-    def _residual_of(self, displacement: Complex, force: Complex) -> Complex:
+    def _residual_of(self, displacement: Complex, force: Complex, always: float) -> Complex:
+        """Residual for a displacement, the force it causes, and the damping that acts always."""
         residual = self.weight * force
-        residual[1:] += displacement[1:]
-        if self._damping_always:
-            residual[1:] += self.receptance * 1j * self.omega * self.system.mesh_damping_n_s_per_m * displacement[1:]
+        residual[1:] += displacement[1:] * self._with_damper(always)
         residual[0] = (force[0] - self.mean_force_n) / self.system.mesh_stiffness_n_per_m
         return residual
 
-    def _jacobian(self, stiffness: Complex, damping: Complex | None = None) -> Real:
-        """Derivative of the residual by the unknowns, for the harmonics 0 to 2N of a stiffness and a damping."""
+    def _with_damper(self, always: float) -> Complex:
+        """1 + H iω c for each harmonic from 1: what stands before δ_k where a damper acts always."""
+        return np.asarray(1.0 + self.receptance * 1j * self.omega * always)
+
+    def _jacobian(self, stiffness: Complex, always: float, contact: Complex | None = None) -> Real:
+        """Derivative of the residual by the unknowns.
+
+        For harmonics 0 to 2N of a stiffness and, where damping needs contact, of where teeth touch.
+        """
         n = self.n
         minus, plus = _differences(n)
         two_sided = _two_sided(stiffness)
         below, above = two_sided[minus], two_sided[plus]
         by_real, by_imaginary = below + above, 1j * (below - above)
-        if damping is not None:
-            two_sided = _two_sided(damping)
-            below, above = 1j * self.omega * two_sided[minus], 1j * self.omega * two_sided[plus]
+        if contact is not None:
+            two_sided, speed = self.damping * _two_sided(contact), 1j * self.omega
+            below, above = speed * two_sided[minus], speed * two_sided[plus]
             by_real, by_imaginary = by_real + below - above, by_imaginary + 1j * (below + above)
         weight = self.weight[:, None]
         by_real, by_imaginary, by_mean = weight * by_real, weight * by_imaginary, self.weight * stiffness[: n + 1]
-        own = np.ones(n, dtype=np.complex128)
-        if self._damping_always:
-            own += self.receptance * 1j * self.omega * self.system.mesh_damping_n_s_per_m
+        own = self._with_damper(always)
         diagonal = np.arange(n)
         by_real[diagonal + 1, diagonal] += own
         by_imaginary[diagonal + 1, diagonal] += 1j * own
@@ -230,14 +231,15 @@ class _Balance:
         solution[1:] += 1j * found[self.n + 1 :]
         return solution
 
-    def _result(self, displacement: Complex, force: Complex, contact: float, residual: float) -> HarmonicSolution:
+    def _result(
+        self, displacement: Complex, force: Complex, always: float, contact: float, residual: float
+    ) -> HarmonicSolution:
         beyond = np.arange(self.n + 1, 2 * self.n + 1)
         receptance = self.system.receptance_m_per_n(self.mesh_hz * beyond)
-        whole = np.concatenate([displacement, -receptance * force[self.n + 1 :]])
-        total = force.copy()
-        if self._damping_always:
-            omega = 2.0 * np.pi * self.mesh_hz * np.arange(2 * self.n + 1)
-            total += 1j * omega * self.system.mesh_damping_n_s_per_m * whole
+        omega = 2.0 * np.pi * self.mesh_hz * np.arange(2 * self.n + 1)
+        damper = 1.0 + receptance * 1j * omega[self.n + 1 :] * always
+        whole = np.concatenate([displacement, -receptance * force[self.n + 1 :] / damper])
+        total = force + 1j * omega * always * whole
         # What the harmonics beyond N would do to δ if they were let back into the force: their size times the
         # stiffness' part in what answers a force there.
         largest = float(np.abs(displacement[1:]).max())

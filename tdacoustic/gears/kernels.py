@@ -17,7 +17,15 @@ __all__ = ["march", "monodromy"]
 Real = NDArray[np.float64]
 
 
-@njit(cache=True, error_model="numpy")
+def _compiled(function: Any) -> Any:
+    """Compile on first use, and keep the result where a place for it can be written."""
+    try:
+        return njit(cache=True, error_model="numpy")(function)
+    except RuntimeError:  # numba found no such place
+        return njit(error_model="numpy")(function)
+
+
+@_compiled
 def _rates(  # type: ignore[no-untyped-def]
     state, rate, stiffness_now, error_now, direction, inverse_mass, stiffness, damping, drive, mesh
 ):
@@ -45,7 +53,7 @@ def _rates(  # type: ignore[no-untyped-def]
     return force
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def march(  # type: ignore[no-untyped-def]
     state, periods, stiffness_half_steps, error_half_steps, step_s, direction, inverse_mass, stiffness, damping, drive,
     mesh, deltas, forces,
@@ -104,7 +112,7 @@ def march(  # type: ignore[no-untyped-def]
                 state[j] += step_s / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])
 
 
-@njit(cache=True, error_model="numpy")
+@_compiled
 def monodromy(mesh_stiffness, mesh_damping, step_s, direction, inverse_mass, stiffness, damping, terms) -> Any:  # type: ignore[no-untyped-def]
     """Return the monodromy matrix of the linearised motion, shape (14, 14).
 

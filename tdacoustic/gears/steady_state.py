@@ -19,8 +19,9 @@ from tdacoustic.gears.system import GearSystem
 
 __all__ = ["STABLE", "SteadyState", "steady_state"]
 
-STABLE: Final = 1.0
-"""Largest Floquet multiplier of a solution that is taken; beyond it the time integration takes over."""
+STABLE: Final = 1.0 + 1e-6
+"""Largest Floquet multiplier of a solution that is taken; beyond it the time integration takes over. Without any
+damping multipliers lie on the unit circle, up to the round-off of the monodromy matrix."""
 
 STARTS: Final = (1.0, -0.5, 0.6)
 """Of Newton's method: what the harmonics of teeth that cannot separate are multiplied with. Beyond its resonance a

@@ -156,6 +156,8 @@ class Line:
     group : str, optional
         Lines of one group share one colour, if none is given, and one entry of the legend,
         which reads as the group does.
+    points : bool
+        Whether each value has a dot too: for few values, which the line only joins.
     """
 
     x: FloatArray
@@ -166,6 +168,7 @@ class Line:
     width: float | None = None
     opacity: float = 1.0
     group: str | None = None
+    points: bool = False
 
     def __post_init__(self) -> None:
         x = _values(f"x of line {self.name!r}", self.x)

@@ -91,7 +91,7 @@ def _draw_line(axes: Axes, figure: Figure, line: Line, ink: str, label: str) -> 
     x, y = line.x[kept], line.y[kept]
     if line.style == "steps":
         x, y = _steps(x, y, figure.x_axis.log)
-    marker = "o" if kept.size == 1 else None
+    marker = "o" if kept.size == 1 or line.points else None
     axes.plot(
         x,
         y,

@@ -108,7 +108,7 @@ def _line(figure: Figure, element: Line, ink: str, seen: set[str], max_points: i
     y = np.where(element.y[kept] > 0, element.y[kept], np.nan) if figure.y_axis.log else element.y[kept]
     trace: dict[str, Any] = {
         "type": "scatter",
-        "mode": "lines" if kept.size > 1 else "markers",
+        "mode": "markers" if kept.size <= 1 else "lines+markers" if element.points else "lines",
         "x": rounded(element.x[kept], 7),
         "y": rounded(y, 6),
         "line": {
@@ -122,6 +122,8 @@ def _line(figure: Figure, element: Line, ink: str, seen: set[str], max_points: i
         "hovertemplate": _hover(figure, element.name),
         **_legend(figure, element, seen),
     }
+    if element.points:
+        trace["marker"] = {"color": ink, "size": 7, "line": {"width": 1, "color": "paper"}}
     if figure.categories:
         trace["customdata"] = _category_names(figure, element.x[kept])
     return trace

@@ -3,7 +3,18 @@
 from __future__ import annotations
 
 from tdacoustic import __version__
-from tdacoustic.reporting.document import Document, Sentences
+from tdacoustic.reporting.document import Document
+from tdacoustic.reporting.sections.bearing_loads import bearing_loads
+from tdacoustic.reporting.sections.gear_answer import gear_answer
+from tdacoustic.reporting.sections.gear_method import gear_method
+from tdacoustic.reporting.sections.gear_pair import gear_pair
+from tdacoustic.reporting.sections.helix_sweep import helix_sweep
+from tdacoustic.reporting.sections.mesh_stiffness import mesh_stiffness
+from tdacoustic.reporting.sections.meshing_noise import meshing_noise
+from tdacoustic.reporting.sections.model_parameters import model_parameters
+from tdacoustic.reporting.sections.printed import PAPER
+from tdacoustic.reporting.sections.speed_sweep import speed_sweep
+from tdacoustic.reporting.sections.transmission_error import transmission_error
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["predicted_report"]
@@ -16,10 +27,24 @@ def predicted_report(result: FleetPrediction) -> Document:
     ----------
     result : FleetPrediction
     """
+    prediction = result.prediction
+    found = [gear_pair, mesh_stiffness, transmission_error, bearing_loads, speed_sweep, meshing_noise, helix_sweep]
+    sections = [section for section in (make(result) for make in found) if section is not None]
+    speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
     return Document(
         title=result.fleet.name,
-        subtitle="Rapid model of the drive's gears",
+        subtitle="Noise and vibration of a traction drive: what the rapid model of its gears gives",
         origin="calculated",
-        summary=[Sentences(result.prediction.doubts)],
-        footer=[f"Made with tdacoustic {__version__}."],
+        summary=gear_answer(result),
+        sections=[*sections, model_parameters(result), gear_method(result)],
+        facts=[
+            ("Conditions", ", ".join(state.condition.name for state in prediction.conditions)),
+            ("Train speeds", " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds))))),
+            ("Teeth", " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
+        ],
+        footer=[
+            f"Made with tdacoustic {__version__}.",
+            "Levels re 20 µPa. Forces are peak amplitudes, displacements peak to peak where so named.",
+            f"The paper, and its figures, tables and equations, are those of {PAPER}.",
+        ],
     )

@@ -7,6 +7,7 @@ import re
 from tdacoustic.attribution import RunKinematics
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import Analysis
 
@@ -116,25 +117,13 @@ def _rivals(causes: str) -> str:
 
 def _parameters(analysis: Analysis) -> Table:
     assert analysis.fleet is not None
-    rows: list[list[Cell]] = []
-    for parameter in analysis.fleet.parameters():
-        if not USED.fullmatch(parameter.key) or parameter.value is None:
-            continue
-        words, unit = _named(analysis, parameter.key)
-        assumed = parameter.origin.startswith("assumed")
-        origin = parameter.origin.removeprefix("assumed").lstrip(", ").capitalize() if assumed else parameter.origin
-        value = _value_words(parameter.key, parameter.value)
-        if parameter.stderr is not None:
-            value += f" ± {parameter.stderr:.2g}"
-        rows.append([words, f"{value} {unit}".rstrip(), "assumed" if assumed else None, origin])
-    columns = (
-        Column("parameter", "Parameter"),
-        Column("value", "Value"),
-        Column("standing", "Standing", kind="origin"),
-        Column("origin", "Where it comes from"),
-    )
     title = f"What the kinematics rests on, from the fleet file of {analysis.fleet.name}"
-    return Table("kinematics-parameters", title, columns, rows)
+    return parameter_table(
+        "kinematics-parameters",
+        title,
+        analysis.fleet,
+        lambda key: _named(analysis, key) if USED.fullmatch(key) else None,
+    )
 
 
 def _named(analysis: Analysis, key: str) -> tuple[str, str]:
@@ -150,11 +139,3 @@ def _named(analysis: Analysis, key: str) -> tuple[str, str]:
     words, unit = _EXCITATION_WORDS[parts[-1]]
     name = analysis.fleet.motor.excitation[int(parts[2]) - 1].name
     return f"Excitation {name}{', ' if words else ''}{words}", unit
-
-
-def _value_words(key: str, value: object) -> str:
-    if isinstance(value, tuple) and value and isinstance(value[0], tuple):
-        return "; ".join(f"{row[1]:g} at {row[0]:g} rpm" for row in value)
-    if isinstance(value, tuple):
-        return " : ".join(f"{item:g}" for item in value)
-    return f"{value:.7g}" if isinstance(value, int | float) else str(value)

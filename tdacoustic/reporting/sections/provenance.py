@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
-from tdacoustic.results import Analysis
+from tdacoustic.results import Analysis, FleetPrediction
 
-__all__ = ["ASSUMPTIONS", "provenance"]
+__all__ = ["ASSUMPTIONS", "provenance", "steps_of"]
 
 ASSUMPTIONS = (
     "The channels' components, directions, distances and sensitivities are taken from the campaign file.",
@@ -31,7 +31,7 @@ def provenance(analysis: Analysis) -> Section:
     blocks.append(Section("settings", "Settings", [Table("settings", "Settings in force", columns, settings)]))
     blocks.append(Section("assumptions", "Assumptions", [Sentences(ASSUMPTIONS)]))
     if analysis.records:
-        blocks.append(_steps(analysis))
+        blocks.append(steps_of(analysis))
     blocks.append(Section("versions", "Versions", [Facts(list(analysis.versions.items()))]))
     return Section("provenance", "How the numbers came about", blocks)
 
@@ -44,10 +44,11 @@ def _shown(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def _steps(analysis: Analysis) -> Details:
+def steps_of(result: Analysis | FleetPrediction) -> Details:
+    """Return the steps of a result, folded away."""
     rows = [
         (record.label, record.title, record.step, record.version, key[:16], ", ".join(v[:23] for _, v in record.inputs))
-        for key, record in analysis.records
+        for key, record in result.records
     ]
     columns = (
         Column("label", "Of"),

@@ -1,0 +1,165 @@
+"""Bearing forces: their spectra condition by condition, as in Fig. 9 of the paper."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.drive import GearState
+from tdacoustic.gears import DIRECTIONS, GEARS, SteadyState, sampling_points
+from tdacoustic.reporting.document import Block, Details, FigureBlock, Paragraph, Section
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.sections.gear_words import (
+    DIRECTION_SLOTS,
+    DIRECTION_SYMBOLS,
+    by_speed,
+    conditions_words,
+    hertz,
+    largest_line,
+    newtons,
+    sentence,
+    shown_state,
+    state_words,
+)
+from tdacoustic.reporting.sections.loads_over_speed import loads_over_speed
+from tdacoustic.reporting.sections.words import slug
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["bearing_loads"]
+
+HARMONICS_AT_LEAST = 5
+"""Mesh harmonics that a spectrum shows in any case."""
+DECADES = 5
+"""Of the strongest line, that a spectrum shows."""
+EDGE = 1.3
+"""Where a point without a force is drawn, over the lower end of the axis."""
+SAME = 1e-3
+"""Relative difference below which a sampling point is the line at it."""
+
+METHOD = (
+    "A force is what the shaft exerts on its bearings through their springs and dampers, K x + C x'. It is the total "
+    "of all bearings of a gear: how it is split between the two bearings of a shaft is not modelled. x lies along the "
+    "line of centres, y is tangential, z lies along the shafts. Amplitudes are peak values of a line."
+)
+NOTHING_BETWEEN = (
+    "The motion repeats with each mesh period, so it has nothing between the mesh harmonics: at the sampling points "
+    "there the force is zero, which a logarithmic axis cannot show; crosses at its lower edge mark them. What the "
+    "paper reads at its points between the harmonics belongs to its record (length, window, what is left of the "
+    "start), not to a motion like this one."
+)
+NOT_REPEATING = (
+    "The motion does not repeat. The lines are the mesh harmonics and the strongest others of a record of it; what is "
+    "broadband has no line, so a sampling point holds only the part of its band that is in lines."
+)
+
+
+def bearing_loads(result: FleetPrediction) -> Section:
+    """Return the section on bearing forces."""
+    states = by_speed(result.prediction.conditions)
+    loaded = [state for state in states if largest_line(state) is not None]
+    blocks: list[Block] = [Paragraph(METHOD)]
+    still = [state for state in states if state not in loaded]
+    if still:
+        without = "without torque the teeth of the model do not touch, and there is no force"
+        blocks.append(Paragraph(sentence(f"{conditions_words(still)}: {without}")))
+    if loaded:
+        blocks += [_spectra(result, loaded), loads_over_speed(result, loaded)]
+    return Section("bearing-forces", "Bearing forces", blocks)
+
+
+def _spectra(result: FleetPrediction, loaded: list[GearState]) -> Section:
+    shown = shown_state(result)
+    shown = shown if shown in loaded else loaded[len(loaded) // 2]
+    others: list[Block] = []
+    for state in loaded:
+        if state is not shown:
+            others += _of_condition(result, state)
+    blocks = _of_condition(result, shown)
+    if others:
+        rest = [state for state in loaded if state is not shown]
+        blocks.append(Details(sentence(f"spectra of {conditions_words(rest)}").rstrip("."), others))
+    return Section("force-spectra", "Spectra", blocks)
+
+
+def _of_condition(result: FleetPrediction, state: GearState) -> list[Block]:
+    highest = max(result.fleet.radiation.max_frequency_hz.value, HARMONICS_AT_LEAST * state.mesh_hz * (1.0 + 1e-9))
+    figures = [FigureBlock(_figure(state, gear, highest), "calculated") for gear in range(len(GEARS))]
+    return [Paragraph(sentence(f"{state_words(state)}: {_words(state)}")), *figures]
+
+
+def _words(state: GearState) -> str:
+    largest = largest_line(state)
+    assert largest is not None
+    gear, direction, force, frequency = largest
+    text = f"the largest line is {newtons(force)} at {hertz(frequency)} ({gear}, {direction}). "
+    return text + _between_words(state.steady)
+
+
+def _between_words(steady: SteadyState) -> str:
+    if steady.repeats_after == 1:
+        return NOTHING_BETWEEN
+    if steady.repeats_after is None:
+        return NOT_REPEATING
+    return (
+        f"The motion repeats only after {steady.repeats_after} mesh periods, so it has lines at every multiple of "
+        f"{hertz(steady.mesh_hz / steady.repeats_after)}, between the mesh harmonics too, and the sampling points "
+        "there hold them."
+    )
+
+
+def _figure(state: GearState, gear: int, highest_hz: float) -> Figure:
+    forces = state.forces
+    held = forces.frequency_hz <= highest_hz
+    frequencies, amplitudes = forces.frequency_hz[held], np.abs(forces.amplitude_n[gear][:, held])
+    top = float(amplitudes.max())
+    bottom = 10.0 ** math.floor(math.log10(top) - DECADES)
+    drawn = np.where(amplitudes >= bottom, amplitudes, np.nan)
+    elements: list[Element] = [_stems(frequencies, drawn, bottom)]
+    for direction, values in zip(DIRECTIONS, drawn, strict=True):
+        slot, symbol = DIRECTION_SLOTS[direction], DIRECTION_SYMBOLS[direction]
+        elements.append(Markers(frequencies, values, direction, symbol=symbol, color=slot))
+    elements += _sampled(state, gear, highest_hz, bottom)
+    name = GEARS[gear]
+    return Figure(
+        slug("spectrum", name, state.condition.name),
+        f"Forces on the bearings of the {name}, {state_words(state)}",
+        f"Lines up to {hertz(highest_hz)}; those {DECADES} decades below the strongest are left out. The sampling "
+        f"points of Fig. 9 are the mesh harmonics ({hertz(state.mesh_hz)}) and three between each two of them, each "
+        "with the energy of the lines around it; a cross marks those that are not a line themselves, at the lower edge "
+        "those without a force.",
+        Axis("Frequency", "Hz", limits=(0.0, 1.02 * highest_hz)),
+        Axis("Force", "N", "log", limits=(bottom, 3.0 * top), note="peak amplitude"),
+        elements,
+        height=380,
+    )
+
+
+def _stems(frequencies: NDArray[np.float64], values: NDArray[np.float64], bottom: float) -> Line:
+    """A thin line from the bottom to the largest direction of each spectral line."""
+    tops = np.fmax.reduce(values, axis=0)
+    gaps = np.full(tops.size, np.nan)
+    y = np.stack([np.where(np.isfinite(tops), bottom, np.nan), tops, gaps], axis=1)
+    return Line(np.repeat(frequencies, 3), y.ravel(), "lines", color=7, width=1.0)
+
+
+def _sampled(state: GearState, gear: int, highest_hz: float, bottom: float) -> list[Markers]:
+    """The paper's sampling points: those without a force at the lower edge, those with more than one line at theirs."""
+    points = sampling_points(state.mesh_hz, highest_hz)
+    values = state.forces.sampled_n(points)[gear]
+    empty = values.max(axis=0) < bottom
+    found = []
+    if empty.any():
+        edge = np.full(int(empty.sum()), EDGE * bottom)
+        found.append(Markers(points[empty], edge, "sampled: zero", symbol="x", color=7))
+    lines = state.forces.frequency_hz
+    nearest = np.abs(lines[None, :] - points[:, None]).argmin(axis=1)
+    alone = np.abs(lines[nearest] / points - 1.0) < SAME
+    alone = alone & np.isclose(values, np.abs(state.forces.amplitude_n[gear][:, nearest]), rtol=SAME)
+    gathered = np.where(alone | (values < bottom), np.nan, values)
+    if np.isfinite(gathered).any():
+        texts = [f"direction {direction}" for direction in DIRECTIONS for _ in points]
+        x = np.tile(points, len(DIRECTIONS))
+        found.append(Markers(x, gathered.ravel(), "sampled", texts=texts, symbol="x", color=3))
+    return found

@@ -1,0 +1,159 @@
+"""The answer first: what the gears do in each condition, in which regime, and what speaks against it."""
+
+from __future__ import annotations
+
+from tdacoustic.drive import GearState
+from tdacoustic.fleet import Fleet
+from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
+from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Sentences, Table
+from tdacoustic.reporting.sections.gear_words import (
+    by_speed,
+    conditions_words,
+    flank_words,
+    hertz,
+    largest_line,
+    law_words,
+    level_unit,
+    micrometres,
+    motion_words,
+    newtons,
+    sentence,
+    significant,
+    state_words,
+    torque_words,
+)
+from tdacoustic.reporting.sections.helix_sweep import helix_words
+from tdacoustic.reporting.sections.loads_over_speed import largest_words, rise_words
+from tdacoustic.reporting.sections.meshing_noise import reading_words
+from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
+from tdacoustic.reporting.sections.speed_sweep import sweep_words
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["gear_answer", "regime_words"]
+
+SCOPE = (
+    "Computed are the gears on their bearings and Masuda's meshing noise; the motor, the housing and the sound around "
+    "the drive are not."
+)
+
+
+TERMS = (
+    "DTE is the dynamic transmission error. Forces are the total of a gear's bearings, peak amplitudes of a line; x "
+    "lies along the line of centres, y is tangential, z lies along the shafts."
+)
+
+
+def gear_answer(result: FleetPrediction) -> list[Block]:
+    """Return the summary: the regime, a sentence a condition, what holds over the conditions, then the doubts."""
+    states = list(result.prediction.conditions)
+    blocks: list[Block] = [
+        Paragraph(f"{regime_words(result)} {SCOPE}"),
+        Sentences([_of_condition(result.fleet, state) for state in states]),
+    ]
+    if any(state.masuda_db is not None for state in states):
+        blocks.append(Paragraph(f"{TERMS} {reading_words(result.fleet)}"))
+    over = [sentence(text) for text in _over_conditions(result) if text]
+    if over:
+        blocks.append(Sentences(over))
+    blocks += [Notice("warning", sentence(doubt)) for doubt in result.prediction.doubts]
+    blocks.append(_table(result))
+    return blocks
+
+
+def regime_words(result: FleetPrediction) -> str:
+    """Say which regime is computed, and what the torque's sign means."""
+    fleet, states = result.fleet, result.prediction.conditions
+    torques = [state.condition.torque_n_m for state in states]
+    mode, low, high = fleet.operation.mode.value, min(torques), max(torques)
+    torque = torque_words(high) if low == high else f"{torque_words(low)} to {torque_words(high)}"
+    if not low and not high:
+        text = f"Regime: {mode}, no torque, so that nothing presses the flanks of the teeth together."
+    else:
+        powers = sorted(1e-3 * state.condition.power_w for state in states)
+        ends = list(dict.fromkeys((significant(powers[0]), significant(powers[-1]))))
+        text = f"Regime: {mode}, {torque} of one motor, {law_words(fleet)} ({' to '.join(ends)} kW). "
+        text += _sign_words(states)
+    return f"{text} {_of_the_test(result)}".strip()
+
+
+def _sign_words(states: tuple[GearState, ...]) -> str:
+    drive = [state for state in states if state.condition.torque_n_m > 0.0]
+    coast = [state for state in states if state.condition.torque_n_m < 0.0]
+    up = "the motor drives the wheelset and the drive flanks carry"
+    down = "the wheelset drives the motor and the coast flanks carry"
+    if not coast or not drive:
+        return f"{'Above' if drive else 'Below'} zero {up if drive else down}."
+    return sentence(f"in {conditions_words(drive)} {up}, in {conditions_words(coast)} {down}")
+
+
+def _of_the_test(result: FleetPrediction) -> str:
+    """What the paper's test was, for a fleet that is the paper's."""
+    if not is_of_the_paper(result.fleet):
+        return ""
+    unit, states = result.prediction.unit, result.prediction.conditions
+    text = (
+        f"In the test of the paper ({PAPER}, section 3.1) another locomotive hauled this one, so that the gears "
+        "carried drag only, on the coast flanks; how much is not printed."
+    )
+    loads = [unit.line_load_n_per_m(state.condition.torque_n_m) for state in states]
+    if min(loads) >= LOW_LOAD_N_PER_M:
+        return f"{text} The load computed here is another regime than that of the test."
+    return text
+
+
+def _of_condition(fleet: Fleet, state: GearState) -> str:
+    condition, steady = state.condition, state.steady
+    start = f"{state_words(state)}: mesh frequency {hertz(state.mesh_hz)}, {_torque(condition.torque_n_m)}"
+    if steady.method == "at_rest":
+        return sentence(
+            f"{start}; the teeth of the model do not touch, so there is no vibration, no force and no meshing noise"
+        )
+    parts = [f"DTE {micrometres(steady.dte_pp_m)} peak to peak"]
+    largest = largest_line(state)
+    if largest is not None:
+        gear, direction, force, frequency = largest
+        parts.append(f"largest bearing force {newtons(force)} at {hertz(frequency)} ({gear}, {direction})")
+    if state.masuda_db is not None:
+        parts.append(f"Masuda's level {state.masuda_db:.1f} {level_unit(fleet)}")
+    return sentence(f"{start}; {', '.join(parts)}. {sentence(motion_words(steady))}")
+
+
+def _torque(torque_n_m: float) -> str:
+    return f"torque {torque_words(torque_n_m)} ({flank_words(torque_n_m)})" if torque_n_m else "no torque"
+
+
+def _over_conditions(result: FleetPrediction) -> list[str]:
+    loaded = [state for state in by_speed(result.prediction.conditions) if largest_line(state) is not None]
+    found = []
+    if loaded:
+        found = [largest_words(loaded), rise_words(loaded)]
+    return [*found, sweep_words(result), helix_words(result)]
+
+
+def _table(result: FleetPrediction) -> Table:
+    columns = (
+        Column("condition", "Condition"),
+        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
+        Column("motor_speed_rpm", "Motor", "rpm", 1, "number"),
+        Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"),
+        Column("torque_n_m", "Torque", "N m", 0, "number"),
+        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
+        Column("largest_force_n", "Largest force", "N", 0, "number"),
+        Column("masuda_spl_1m_db", "Masuda, 1 m", level_unit(result.fleet), 1, "number"),
+    )
+    rows: list[list[Cell]] = []
+    for state in result.prediction.conditions:
+        condition, largest = state.condition, largest_line(state)
+        rows.append(
+            [
+                condition.name,
+                condition.train_speed_km_h,
+                60.0 * condition.motor_hz,
+                state.mesh_hz,
+                condition.torque_n_m,
+                1e6 * state.steady.dte_pp_m,
+                None if largest is None else largest[2],
+                state.masuda_db,
+            ]
+        )
+    return Table("conditions", "The conditions", columns, rows, origin="calculated")

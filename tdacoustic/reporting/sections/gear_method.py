@@ -1,0 +1,95 @@
+"""How the numbers of the modelled side came about: method, assumptions, input, steps, versions."""
+
+from __future__ import annotations
+
+from tdacoustic.gears import SteadyState
+from tdacoustic.gears.harmonic_balance import FEWEST_HARMONICS, RESIDUAL, TAIL
+from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, RECORD_PERIODS, SETTLED
+from tdacoustic.gears.sweep import SWEEP_PERIODS
+from tdacoustic.reporting.document import Block, Column, Facts, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.sections.printed import PAPER
+from tdacoustic.reporting.sections.provenance import steps_of
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["gear_method"]
+
+EQUATIONS = (
+    "The gears are two rigid bodies on linear springs and dampers, coupled by one mesh with a gap (equations (1) to "
+    f"(6) of {PAPER}). All but the mesh force is linear, so a periodic motion is one scalar balance of harmonics in δ."
+)
+
+
+def gear_method(result: FleetPrediction) -> Section:
+    """Return the section on method and provenance."""
+    blocks: list[Block] = [
+        Section("gear-method", "Method", [Paragraph(_method(result))]),
+        Section("gear-assumptions", "Assumptions", [Sentences(_assumptions(result))]),
+        Section("gear-input", "Input", [_input(result)]),
+    ]
+    if result.records:
+        blocks.append(steps_of(result))
+    blocks.append(Section("versions", "Versions", [Facts(list(result.versions.items()))]))
+    return Section("provenance", "How the numbers came about", blocks)
+
+
+def _input(result: FleetPrediction) -> Table:
+    columns = (Column("file", "Fleet file"), Column("format", "Format"), Column("sha256", "SHA-256"))
+    return Table("inputs", "Input", columns, [(result.fleet.path.name, "TOML", result.sha256)])
+
+
+def _method(result: FleetPrediction) -> str:
+    states = [state.steady for state in result.prediction.conditions]
+    text = (
+        f"{EQUATIONS} It is solved for {FEWEST_HARMONICS} harmonics or as many more as bring the estimated error of δ "
+        f"by those left out below {_small(TAIL)} of its peak to peak, to a residual of {_small(RESIDUAL)}; where teeth "
+        "separate by Newton's method, with the force taken from samples over the period. The largest Floquet "
+        "multiplier of each solution says whether it is stable; the rigid rotation is taken out before. Where no "
+        "stable one is found the equations are integrated in time, with the contact lines as the printed trapezoid, "
+        f"until the motion repeats after at most {LONGEST_REPEAT} mesh periods within {_small(SETTLED)} of its peak to "
+        f"peak; after {MOST_PERIODS} mesh periods ({SWEEP_PERIODS} in the sweep) a motion counts as not repeating, and "
+        f"its lines are those of a record of up to {RECORD_PERIODS} mesh periods. Bearing "
+        "forces follow line by line from the mesh force."
+    )
+    return f"{text} {_harmonics_words(states)}".strip()
+
+
+def _small(value: float) -> str:
+    return f"{value:g}".replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
+
+
+def _harmonics_words(states: list[SteadyState]) -> str:
+    found = sorted({s.lines.harmonic.size for s in states if s.method == "harmonic_balance"})
+    if not found:
+        return ""
+    most = f"{found[0]} to {found[-1]}" if len(found) > 1 else f"{found[0]}"
+    return f"In these conditions the balanced solutions have lines at {most} mesh harmonics."
+
+
+def _assumptions(result: FleetPrediction) -> list[str]:
+    unit, fleet = result.prediction.unit, result.fleet
+    amplitudes = unit.system.transmission_error_m
+    error = ", ".join(f"{1e6 * amplitude:g}" for amplitude in amplitudes)
+    waves = "a sine at the mesh frequency" if len(amplitudes) == 1 else "sines at the first mesh harmonics"
+    where = "amplitude" if len(amplitudes) == 1 else "amplitudes"
+    damping = (
+        "The damping of the mesh acts always, also while the teeth are apart, as the paper prints it."
+        if unit.system.mesh_damping == "always"
+        else "The damping of the mesh acts only while teeth touch."
+    )
+    found = [
+        "The centres lie along x (ψ = 0), so that y is tangential; with the angle of the paper's text taken otherwise "
+        "the force along x would vanish.",
+        "The working transverse pressure angle stands for the pressure angle in the direction of the mesh force.",
+        f"The transmission error of the unloaded gears is {waves}, {where} {error} µm, phase 0, at any speed and load.",
+        f"The backlash is {2e6 * unit.system.half_backlash_m:g} µm, the same at every tooth.",
+        "Springs and dampers are the total of a gear's bearings; nothing is split between the two bearings of a shaft.",
+        damping,
+        "Gears are of steel, with solid discs; the mean stiffness of the mesh does not change with the load.",
+        "No friction between the teeth, no bending or torsion of the shafts, no tilt of the gears, no tip relief or "
+        "other flank correction, no scatter between teeth.",
+        "The torque is constant over a turn, and that of the wheel balances it; motor and wheelset add no inertia "
+        "beyond what the two gears are given.",
+    ]
+    if len(fleet.gear_pair) > 1:
+        found.append("Losses and dynamics of the other gear pairs are left out.")
+    return found

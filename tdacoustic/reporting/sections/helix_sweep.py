@@ -1,0 +1,96 @@
+"""The helix sweep: what another helix angle of the same teeth changes."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tdacoustic.drive import HelixCase
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.sections.gear_words import level_unit, micrometres, motion_cells
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["helix_sweep", "helix_words"]
+
+
+def helix_sweep(result: FleetPrediction) -> Section | None:
+    """Return the section on the helix sweep, or None where the fleet names no angles."""
+    cases = sorted(result.prediction.helix, key=lambda case: case.helix_angle_deg)
+    if not cases:
+        return None
+    angles = np.array([case.helix_angle_deg for case in cases])
+    blocks: list[Block] = [Paragraph(_method(cases[0])), _table(result, cases)]
+    if len(cases) > 1:
+        dte = np.array([1e6 * case.gears.steady.dte_pp_m for case in cases])
+        levels = np.array([math.nan if case.gears.masuda_db is None else case.gears.masuda_db for case in cases])
+        distances = np.array([1e3 * case.unit.geometry.centre_distance_m for case in cases])
+        unit = level_unit(result.fleet)
+        if dte.any():
+            axis = Axis("DTE", "µm", note="peak to peak")
+            blocks.append(_figure("helix-dte", "Dynamic transmission error over the helix angle", axis, angles, dte))
+        if np.isfinite(levels).any():
+            axis = Axis("Level at 1 m", unit, reference="20 µPa")
+            blocks.append(_figure("helix-masuda", "Masuda's level over the helix angle", axis, angles, levels))
+        axis = Axis("Centre distance", "mm")
+        blocks.append(_figure("helix-distance", "Centre distance over the helix angle", axis, angles, distances))
+    return Section("helix-sweep", "Helix sweep", blocks)
+
+
+def helix_words(result: FleetPrediction) -> str:
+    """Return what the helix sweep found in a sentence, empty without one or where nothing moves."""
+    cases = [case for case in result.prediction.helix if case.gears.steady.dte_pp_m > 0.0]
+    if len(cases) < 2:
+        return ""
+    least, most = (pick(cases, key=lambda case: case.gears.steady.dte_pp_m) for pick in (min, max))
+    distances = [1e3 * case.unit.geometry.centre_distance_m for case in cases]
+    return (
+        f"helix angles {', '.join(f'{case.helix_angle_deg:g}°' for case in cases)}: the DTE is between "
+        f"{micrometres(least.gears.steady.dte_pp_m)} ({least.helix_angle_deg:g}°) and "
+        f"{micrometres(most.gears.steady.dte_pp_m)} ({most.helix_angle_deg:g}°), with the centre distance from "
+        f"{min(distances):.1f} to {max(distances):.1f} mm"
+    )
+
+
+def _method(case: HelixCase) -> str:
+    condition = case.gears.condition
+    return (
+        f"At {condition.train_speed_km_h:.4g} km/h, the fastest condition. Rack, teeth, profile shifts and face width "
+        "stay; the centre distance, the contact ratios, the stiffness of the mesh and the working pressure angle "
+        "follow from the helix angle. Masses, inertias, bearings and the unloaded transmission error stay as they "
+        "are: that a longer contact line averages a real one more is left out."
+    )
+
+
+def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
+    columns = (
+        Column("helix_angle_deg", "Helix angle", "°", 1, "number"),
+        Column("centre_distance_mm", "Distance", "centres, mm", 3, "number"),
+        Column("transverse_contact_ratio", "Transverse", "contact ratio", 3, "number"),
+        Column("overlap_ratio", "Overlap", "ratio", 3, "number"),
+        Column("stiffness_n_per_um", "k̄", "N/µm", 0, "number"),
+        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
+        Column("masuda_spl_1m_db", "Level at 1 m", level_unit(result.fleet), 1, "number"),
+        Column("motion", "Motion"),
+    )
+    rows: list[list[Cell]] = [
+        [
+            case.helix_angle_deg,
+            1e3 * case.unit.geometry.centre_distance_m,
+            case.unit.geometry.transverse_contact_ratio,
+            case.unit.geometry.overlap_ratio,
+            1e-6 * case.unit.stiffness.normal_n_per_m,
+            1e6 * case.gears.steady.dte_pp_m,
+            case.gears.masuda_db,
+            motion_cells(case.gears.steady)[0],
+        ]
+        for case in cases
+    ]
+    return Table("helix", "Helix sweep", columns, rows, origin="calculated")
+
+
+def _figure(name: str, title: str, axis: Axis, angles: np.ndarray, values: np.ndarray) -> FigureBlock:
+    line = Line(angles, values, axis.label, points=True)
+    caption = "One dot a computed angle; the lines between them only lead the eye."
+    return FigureBlock(Figure(name, title, caption, Axis("Helix angle", "°"), axis, [line], height=280), "calculated")

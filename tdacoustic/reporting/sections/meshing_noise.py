@@ -1,0 +1,225 @@
+"""Masuda's meshing noise beside Table 5 of the paper, and what of it can be compared."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tdacoustic.drive import GearState
+from tdacoustic.fleet import Fleet
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, hertz, level_unit, sentence
+from tdacoustic.reporting.sections.parameters import parameter_table
+from tdacoustic.reporting.sections.printed import (
+    DTE_PP_UM,
+    FIGURE_11_CONDITION,
+    LEVEL_OF_TEXT_DB,
+    PAPER,
+    TABLE_5,
+    Printed,
+    is_of_the_paper,
+    printed_of,
+)
+from tdacoustic.reporting.sections.words import pretty_signs
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["PARAMETERS", "meshing_noise", "reading_words"]
+
+PARAMETERS = {
+    "masuda.constant_db": ("Masuda: constant C", "dB"),
+    "masuda.displacement": ("Masuda: what X is (displacement)", ""),
+    "masuda.weighting": ("Masuda: weighting of the level", ""),
+    "masuda.placement": ("Masuda: where its source is put", ""),
+}
+"""Words and unit of the formula's reading, by key of the fleet file."""
+
+FEWEST = 3
+"""Conditions below which a shape is not compared as a whole."""
+
+METHOD = (
+    "Equation (8) of the paper, after Masuda, Abe and Hattori (1986): L = 20 (1 − tan(β/2)) u^(1/8) / εα^(1/4) "
+    "√((5.56 + √v) / 5.56) + 20 lg W + 20 lg X + C, with the power W of one motor in kW and v the speed of the pitch "
+    "line in m/s. It is the overall level of a whole gear unit at 1 m, its housing included; how it is spread over "
+    "frequencies is not part of it."
+)
+OPEN = (
+    "Its absolute height cannot be held against a measurement before C is calibrated: the unit of W, what X is and C "
+    "are open in what is printed, and within one reading they are one additive constant. Differences between "
+    "conditions can be compared within one reading; between readings they differ by the torque of each condition."
+)
+
+
+def meshing_noise(result: FleetPrediction) -> Section:
+    """Return the section on Masuda's meshing noise."""
+    states = by_speed(result.prediction.conditions)
+    beside = _beside(result.fleet, states)
+    blocks: list[Block] = [Paragraph(METHOD), Paragraph(reading_words(result.fleet)), _reading(result.fleet)]
+    silent = [state for state in states if state.masuda_db is None]
+    if silent:
+        words = "no power or no vibration, so the formula has no level"
+        blocks.append(Paragraph(sentence(f"{conditions_words(silent)}: {words}")))
+    reference = next((state for state in states if state.masuda_db is not None), None)
+    if reference is not None:
+        blocks += [_table(result.fleet, states, reference, beside)]
+        if len(states) - len(silent) > 1:
+            blocks.append(FigureBlock(_figure(result.fleet, states, reference, beside), "calculated"))
+    if not _is_calibrated(result.fleet):
+        blocks.append(Paragraph(OPEN))
+    if beside and reference is not None:
+        blocks += _comparison(result.fleet, states, beside)
+    return Section("meshing-noise", "Meshing noise", blocks)
+
+
+def reading_words(fleet: Fleet) -> str:
+    """Say in which reading the formula is used, and how far its height can be trusted."""
+    masuda = fleet.masuda
+    constant = masuda.constant_db
+    value = pretty_signs(f"{constant.value:g}")
+    if masuda.displacement.value == "um_pp":
+        x = "X the peak to peak of the DTE in µm"
+    else:
+        x = "X the peak to peak of the DTE over the static compression F₀ / k̄"
+    text = f"Masuda's level is that at 1 m in {level_unit(fleet)} re 20 µPa with C = {value} dB, {x}, W in kW."
+    if _is_calibrated(fleet):
+        error = "" if constant.stderr is None else f" ± {constant.stderr:.2g} dB"
+        return f"{text} The constant is calibrated{error} ({constant.origin})."
+    return f"{text} The constant is not calibrated, so only differences between conditions mean something."
+
+
+def _is_calibrated(fleet: Fleet) -> bool:
+    constant = fleet.masuda.constant_db
+    return constant.stderr is not None or constant.origin.startswith("calibrated")
+
+
+def _reading(fleet: Fleet) -> Table:
+    return parameter_table("masuda-reading", "The reading of the formula in force", fleet, PARAMETERS.get)
+
+
+Beside = dict[str, Printed]
+"""Rows of Table 5 by name of the condition here."""
+
+
+def _beside(fleet: Fleet, states: Sequence[GearState]) -> Beside:
+    if not is_of_the_paper(fleet):
+        return {}
+    found = {state.condition.name: printed_of(state) for state in states}
+    return {name: row for name, row in found.items() if row is not None}
+
+
+def _relative(state: GearState, reference: GearState) -> float | None:
+    assert reference.masuda_db is not None
+    return None if state.masuda_db is None else state.masuda_db - reference.masuda_db
+
+
+def _table(fleet: Fleet, states: Sequence[GearState], reference: GearState, beside: Beside) -> Table:
+    unit, first = level_unit(fleet), reference.condition.name
+    columns = [
+        Column("condition", "Condition"),
+        Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"),
+        Column("power_kw", "Power W", "kW", 1, "number"),
+        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
+        Column("masuda_spl_1m_db", "Level at 1 m", unit, 1, "number"),
+        Column("relative_db", "Level", f"dB re condition {first}", 1, "number"),
+    ]
+    printed_first = beside.get(first)
+    if beside:
+        columns.append(Column("printed_db", "Table 5", "dB, printed", 2, "number"))
+    if printed_first is not None:
+        columns.append(Column("printed_relative_db", "Table 5", f"dB re condition {first}", 1, "number"))
+    rows: list[list[Cell]] = []
+    for state in states:
+        condition, row = state.condition, beside.get(state.condition.name)
+        cells: list[Cell] = [condition.name, state.mesh_hz, 1e-3 * abs(condition.power_w), 1e6 * state.steady.dte_pp_m]
+        cells += [state.masuda_db, _relative(state, reference)]
+        if beside:
+            cells.append(None if row is None else row.level_db)
+        if printed_first is not None:
+            cells.append(None if row is None else row.level_db - printed_first.level_db)
+        rows.append(cells)
+    return Table("masuda", "Masuda's meshing noise of the conditions", columns, rows, origin="calculated")
+
+
+def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, beside: Beside) -> Figure:
+    name = reference.condition.name
+    ours = [_relative(state, reference) for state in states]
+    lines = [
+        Line(
+            np.array([state.mesh_hz for state in states]),
+            np.array([math.nan if value is None else value for value in ours]),
+            "this drive",
+            color=0,
+            points=True,
+        )
+    ]
+    caption = "One dot a condition; the lines between them only lead the eye."
+    if name in beside:
+        rows = list(beside.values())
+        levels = np.array([row.level_db - beside[name].level_db for row in rows])
+        lines.append(
+            Line(np.array([row.mesh_hz for row in rows]), levels, "Table 5, printed", "dashed", color=1, points=True)
+        )
+        caption = f"Calculated, and as printed in Table 5 of {PAPER}, each relative to its condition {name}. {caption}"
+    return Figure(
+        "masuda-shape",
+        f"Masuda's level over the conditions, relative to condition {name}",
+        caption,
+        Axis("Mesh frequency", "Hz"),
+        Axis("Level", level_unit(fleet), reference=f"condition {name}"),
+        lines,
+        height=360,
+    )
+
+
+def _comparison(fleet: Fleet, states: Sequence[GearState], beside: Beside) -> list[Block]:
+    of_figure = next(row for row in TABLE_5 if row.condition == FIGURE_11_CONDITION)
+    factor = 10.0 ** ((of_figure.level_db - LEVEL_OF_TEXT_DB) / 20.0)
+    notice = (
+        "Against Table 5 only the shape over the conditions can be compared; the absolute level cannot. The paper's "
+        f"own two levels of condition {FIGURE_11_CONDITION} contradict each other: {LEVEL_OF_TEXT_DB:g} dB in section "
+        f"4.3 (with X = {DTE_PP_UM:g} µm) and {of_figure.level_db:g} dB in Table 5, a factor of {factor:.2f} in W X. "
+        "Neither the torque, the transmission error nor the inertias, bearings and damping behind Table 5 are printed."
+    )
+    items = [text for text in (_offset_words(states, beside), *_shape_words(fleet, states, beside)) if text]
+    return [Notice("info", notice), Sentences([sentence(text) for text in items])]
+
+
+def _offset_words(states: Sequence[GearState], beside: Beside) -> str:
+    """How far this drive's levels and Table 5 are apart, as an offset and what is left beside it."""
+    pairs = [(s.masuda_db, beside[s.condition.name].level_db) for s in states if s.condition.name in beside]
+    off = np.array([ours - printed for ours, printed in pairs if ours is not None])
+    if off.size < FEWEST:
+        return ""
+    rest = float(np.sqrt(np.mean((off - off.mean()) ** 2)))
+    return pretty_signs(
+        f"over {off.size} conditions the level here is {off.mean():+.1f} dB off Table 5 on average, which the "
+        f"constant would take up; in shape the two then differ by {rest:.1f} dB rms, at most by "
+        f"{np.abs(off - off.mean()).max():.1f} dB"
+    )
+
+
+def _shape_words(fleet: Fleet, states: Sequence[GearState], beside: Beside) -> list[str]:
+    """The features of Table 5 that a shape can have, met or not met; nothing unless all six conditions are there."""
+    levels = {row.condition: s.masuda_db for s in states if (row := beside.get(s.condition.name)) is not None}
+    held = {name: level for name, level in levels.items() if level is not None}
+    if len(held) < len(TABLE_5):
+        return []
+    unit, printed = level_unit(fleet), {row.condition: row for row in TABLE_5}
+    loudest, of_table = (
+        max(of, key=lambda name: of[name]) for of in (held, {n: r.level_db for n, r in printed.items()})
+    )
+    parts = [
+        (f"rise from condition 1 to 2 (Table 5: {printed['2'].level_db - printed['1'].level_db:+.1f} dB)")
+        + _met(held["2"] > held["1"], f"{held['2'] - held['1']:+.1f} {unit}"),
+        f"maximum in condition 4 or 5 (Table 5: condition {of_table})"
+        + _met(loudest in ("4", "5"), f"in condition {loudest}, {hertz(printed[loudest].mesh_hz)}"),
+        f"lower in condition 6 than in 5 (Table 5: {printed['6'].level_db - printed['5'].level_db:+.1f} dB)"
+        + _met(held["6"] < held["5"], f"{held['6'] - held['5']:+.1f} {unit}"),
+    ]
+    return [pretty_signs(part) for part in parts]
+
+
+def _met(holds: bool, figures: str) -> str:
+    return f": {'met' if holds else 'not met'}, {figures}"

@@ -1,0 +1,251 @@
+"""The sweep of speed, up and down: where motions grow, where teeth separate, where two motions coexist."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.drive import GearState, SpeedSweep
+from tdacoustic.gears import Branch, coexisting
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule
+from tdacoustic.reporting.sections.gear_words import by_speed, hertz, law_words, sentence, significant
+from tdacoustic.reporting.sections.words import joined
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["speed_sweep", "sweep_words"]
+
+METHOD = (
+    "The train gets slowly faster, then slowly slower, at the torque of the fleet's law: each speed starts from the "
+    "motion of the speed before. Where the two ways end in different motions, both are stable, and the history decides "
+    "which one the gears take. The largest Floquet multiplier is of the motion that repeats with each mesh period, "
+    "where one was found: below 1 it is stable; above 1 it is not what the gears do, and the motion shown is another "
+    "one, found by integration in time. Torque ripple, acceleration and scatter between teeth are not part of it."
+)
+
+Mask = NDArray[np.bool_]
+
+
+def speed_sweep(result: FleetPrediction) -> Section | None:
+    """Return the section on the speed sweep, or None where none was computed."""
+    sweep = result.prediction.sweep
+    if sweep is None:
+        return None
+    blocks: list[Block] = [
+        Paragraph(f"{METHOD} {_range_words(result, sweep)}"),
+        Sentences([sentence(words) for words in _findings(sweep)]),
+    ]
+    if not _is_at_rest(sweep):
+        blocks.append(FigureBlock(_displacements(result, sweep), "calculated"))
+        blocks.append(FigureBlock(_multipliers(sweep), "calculated"))
+        if _separate(sweep.up).any() or _separate(sweep.down).any():
+            blocks.append(FigureBlock(_contact(sweep), "calculated"))
+    stretches = list(_stretches(sweep))
+    if stretches:
+        blocks.append(_table(stretches))
+    return Section("speed-sweep", "Speed sweep", blocks)
+
+
+def sweep_words(result: FleetPrediction) -> str:
+    """Return what the sweep found in a sentence, empty without one."""
+    sweep = result.prediction.sweep
+    if sweep is None:
+        return ""
+    slowest, fastest = (significant(sweep.train_speed_km_h[end]) for end in (0, -1))
+    return f"speed sweep from {slowest} to {fastest} km/h: {'; '.join(_findings(sweep))}"
+
+
+def _is_at_rest(sweep: SpeedSweep) -> bool:
+    return set(sweep.up.method) | set(sweep.down.method) == {"at_rest"}
+
+
+def _separate(branch: Branch) -> Mask:
+    """Where teeth under torque leave each other."""
+    return np.asarray((branch.contact_part < 1.0) & (branch.torque_n_m != 0.0))
+
+
+def _repeats(branch: Branch) -> NDArray[np.int64]:
+    return np.array(branch.repeats_after, dtype=np.int64)
+
+
+def _differ(sweep: SpeedSweep) -> tuple[Mask, Mask]:
+    """Where the two branches end in different motions that repeat, and where a motion that does not is on either."""
+    open_ended = (_repeats(sweep.up) == 0) | (_repeats(sweep.down)[::-1] == 0)
+    return coexisting(sweep.up, sweep.down), np.asarray(open_ended)
+
+
+def _range_words(result: FleetPrediction, sweep: SpeedSweep) -> str:
+    speeds, mesh = sweep.train_speed_km_h, sweep.up.mesh_hz
+    return (
+        f"{len(speeds)} speeds from {significant(speeds[0])} to {significant(speeds[-1])} km/h each way (mesh "
+        f"{hertz(float(mesh[0]))} to {hertz(float(mesh[-1]))}), torque {law_words(result.fleet)}."
+    )
+
+
+def _findings(sweep: SpeedSweep) -> list[str]:
+    if _is_at_rest(sweep):
+        return ["without torque nothing moves at any speed"]
+    up, down = sweep.up, sweep.down
+    twice, open_ended = _differ(sweep)
+    found = [f"two motions are stable {_places(sweep, twice)}"] if twice.any() else ["the two ways end in one motion"]
+    if open_ended.any():
+        found[0] += ", judged where both ways repeat"
+        found.append(_open_words(sweep, open_ended))
+    apart = _separate(up) | _separate(down)[::-1]
+    found.append(f"teeth separate {_places(sweep, apart)}" if apart.any() else "teeth stay in contact at every speed")
+    several = (_repeats(up) != 1) | (_repeats(down)[::-1] != 1)
+    if several.any():
+        found.append(f"the motion does not repeat with each mesh period {_places(sweep, several)}")
+    best = max((up, down), key=lambda branch: float(branch.dte_pp_m.max()))
+    peak = int(best.dte_pp_m.argmax())
+    way = "" if not (twice | open_ended).any() else " on the way up" if best is up else " on the way down"
+    largest = f"{significant(1e6 * float(best.dte_pp_m[peak]))} µm at {hertz(float(best.mesh_hz[peak]))}"
+    return [*found, f"the largest DTE is {largest}{way}"]
+
+
+def _open_words(sweep: SpeedSweep, open_ended: Mask) -> str:
+    one_way = (_repeats(sweep.up) == 0) != (_repeats(sweep.down)[::-1] == 0)
+    text = f"at {_counted(open_ended)} a motion does not repeat"
+    if one_way.any():
+        text += f", at {_counted(one_way)} on one way only, where two motions may be stable too"
+    return text
+
+
+def _counted(mask: Mask) -> str:
+    return f"{int(mask.sum())} speed{'s' if mask.sum() > 1 else ''}"
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """First and last place of each stretch in which a mask holds."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(start), int(stop) - 1) for start, stop in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _places(sweep: SpeedSweep, mask: Mask) -> str:
+    """Say where a mask over ascending speeds holds, in km/h; many stretches only by their number."""
+    speeds, runs = sweep.train_speed_km_h, _runs(mask)
+    if len(runs) > 3:
+        first, last = speeds[runs[0][0]], speeds[runs[-1][1]]
+        return f"at {int(mask.sum())} speeds between {first:.4g} and {last:.4g} km/h"
+    words = [
+        f"at {speeds[start]:.4g} km/h" if start == end else f"from {speeds[start]:.4g} to {speeds[end]:.4g} km/h"
+        for start, end in runs
+    ]
+    return joined(words)
+
+
+def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
+    elements: list[Element] = [
+        Line(sweep.up.mesh_hz, 1e6 * sweep.up.dte_pp_m, "up", color=0),
+        Line(sweep.down.mesh_hz, 1e6 * sweep.down.dte_pp_m, "down", style="dashed", color=1),
+    ]
+    twice, _ = _differ(sweep)
+    if twice.any():
+        y = np.concatenate([sweep.up.dte_pp_m[twice], sweep.down.dte_pp_m[::-1][twice]])
+        elements.append(Markers(np.tile(sweep.up.mesh_hz[twice], 2), 1e6 * y, "two motions", symbol="square", color=6))
+    for name, symbol, several in (
+        ("repeats after several mesh periods", "cross", True),
+        ("does not repeat", "x", False),
+    ):
+        held = [(b, np.asarray(_repeats(b) > 1 if several else _repeats(b) == 0)) for b in (sweep.up, sweep.down)]
+        if any(mask.any() for _, mask in held):
+            x = np.concatenate([branch.mesh_hz[mask] for branch, mask in held])
+            y = np.concatenate([branch.dte_pp_m[mask] for branch, mask in held])
+            elements.append(Markers(x, 1e6 * y, name, symbol=symbol, color=2 if several else 3))  # type: ignore[arg-type]
+    elements.append(_conditions(by_speed(result.prediction.conditions)))
+    low, high = float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1])
+    natural = result.prediction.unit.system.natural_frequencies_hz()
+    elements += [Rule(float(value), f"{value:.0f} Hz") for value in natural if low < value < high]
+    return Figure(
+        "sweep-dte",
+        "Dynamic transmission error over the speed sweep",
+        "Peak to peak, of a motion that does not repeat that of its record. Broken vertical lines are natural "
+        "frequencies of the linear system; the nth harmonic of the mesh meets one already at an nth of it. Diamonds "
+        "are the conditions, each computed by itself from teeth in contact.",
+        Axis("Mesh frequency", "Hz", limits=(low, high)),
+        Axis("DTE", "µm", note="peak to peak"),
+        elements,
+        height=440,
+    )
+
+
+def _conditions(states: list[GearState]) -> Markers:
+    x = np.array([state.mesh_hz for state in states])
+    y = np.array([1e6 * state.steady.dte_pp_m for state in states])
+    names = [state.condition.name for state in states]
+    return Markers(x, y, "conditions", labels=names, symbol="diamond", color=7)
+
+
+def _multipliers(sweep: SpeedSweep) -> Figure:
+    low, high = float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1])
+    elements: list[Element] = [
+        Line(sweep.up.mesh_hz, sweep.up.floquet_max, "up", color=0),
+        Line(sweep.down.mesh_hz, sweep.down.floquet_max, "down", style="dashed", color=1),
+        Line(np.array([low, high]), np.array([1.0, 1.0]), "limit of stability", style="dotted", color=7),
+    ]
+    for branch, name, color in ((sweep.up, "up", 0), (sweep.down, "down", 1)):
+        held = _alone(branch.floquet_max)
+        if held.any():
+            points = Markers(branch.mesh_hz[held], branch.floquet_max[held], f"{name}, between gaps", color=color)
+            elements.append(points)
+    return Figure(
+        "sweep-floquet",
+        "Largest Floquet multiplier over the speed sweep",
+        "Of the motion that repeats with each mesh period, where one was found, else of the one that repeats after "
+        "several; above 1 it is unstable, and the motion of the figure above is another. In a gap neither was found.",
+        Axis("Mesh frequency", "Hz", limits=(low, high)),
+        Axis("Largest multiplier"),
+        elements,
+        height=300,
+    )
+
+
+def _alone(values: NDArray[np.float64]) -> Mask:
+    """Where a value stands between two gaps, so that no line can show it."""
+    gap = np.concatenate([[True], np.isnan(values), [True]])
+    return np.asarray(~gap[1:-1] & gap[:-2] & gap[2:])
+
+
+def _contact(sweep: SpeedSweep) -> Figure:
+    return Figure(
+        "sweep-contact",
+        "Part of the time in which teeth touch, over the speed sweep",
+        "",
+        Axis("Mesh frequency", "Hz", limits=(float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1]))),
+        Axis("Teeth touch", "% of time"),
+        [
+            Line(sweep.up.mesh_hz, 100.0 * sweep.up.contact_part, "up", color=0),
+            Line(sweep.down.mesh_hz, 100.0 * sweep.down.contact_part, "down", style="dashed", color=1),
+        ],
+        height=300,
+    )
+
+
+def _stretches(sweep: SpeedSweep) -> Iterator[list[Cell]]:
+    """Rows of the table: what happens from which speed to which."""
+    mesh, speeds = sweep.up.mesh_hz, sweep.train_speed_km_h
+    found: list[tuple[str, str, Mask]] = [("both", "two motions are stable", _differ(sweep)[0])]
+    for name, branch, order in (("up", sweep.up, 1), ("down", sweep.down, -1)):
+        repeats = _repeats(branch)[::order]
+        found.append((name, "teeth separate", _separate(branch)[::order]))
+        for periods in sorted(set(repeats[repeats > 1].tolist())):
+            found.append((name, f"repeats after {periods} mesh periods", repeats == periods))
+        found.append((name, "does not repeat", repeats == 0))
+    for way, what, mask in found:
+        for start, end in _runs(mask):
+            yield [way, what, speeds[start], speeds[end], float(mesh[start]), float(mesh[end]), end - start + 1]
+
+
+def _table(rows: list[list[Cell]]) -> Table:
+    columns = (
+        Column("direction", "Way"),
+        Column("what", "What"),
+        Column("from_km_h", "From", "km/h", 1, "number"),
+        Column("to_km_h", "To", "km/h", 1, "number"),
+        Column("from_mesh_hz", "From", "mesh, Hz", 1, "number"),
+        Column("to_mesh_hz", "To", "mesh, Hz", 1, "number"),
+        Column("speeds", "Speeds", "", 0, "number"),
+    )
+    return Table("sweep-stretches", "What happens at which speeds", columns, rows, origin="calculated")

@@ -1,0 +1,6 @@
+"""The reference drive on the import path."""
+
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parent))  # for reference_drive: pytest's importlib mode adds no folder
