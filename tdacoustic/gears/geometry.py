@@ -14,6 +14,7 @@ from tdacoustic.gears.involute import angle_of_involute, involute
 __all__ = ["GearGeometry", "helix_angle_of"]
 
 _STEEPEST_RAD: Final = math.radians(45.0)
+_ROUND_OFF: Final = 1e-12
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,8 @@ class GearGeometry:
                 yield f"{name} must be > 0, got {getattr(self, name)!r}"
         if not self.clearance_coefficient >= 0.0:
             yield f"clearance_coefficient must be >= 0, got {self.clearance_coefficient!r}"
+        if not all(math.isfinite(shift) for shift in self.profile_shift):
+            yield f"profile shifts must be numbers, got {self.profile_shift[0]!r} and {self.profile_shift[1]!r}"
         if not 0.0 < self.pressure_angle_rad < _STEEPEST_RAD:
             yield f"pressure angle must be above 0° and below 45°, got {math.degrees(self.pressure_angle_rad):g}°"
         if not 0.0 <= self.helix_angle_rad <= _STEEPEST_RAD:
@@ -104,13 +107,13 @@ class GearGeometry:
                 )
         reach = self.centre_distance_m * math.sin(self.working_pressure_angle_rad)
         for which, (tip, base) in enumerate(zip(self.tip_radii_m, self.base_radii_m, strict=True)):
-            if math.sqrt(tip**2 - base**2) > reach * (1.0 + 1e-12):
+            if math.sqrt(tip**2 - base**2) > reach * (1.0 + _ROUND_OFF):
                 yield (
                     f"interference: the tip of the {names[which]} would touch the {names[1 - which]} below its base "
                     f"circle ({self.teeth[1 - which]} teeth, profile shift {self.profile_shift[1 - which]:g})"
                 )
         for which, clearance in enumerate(self.tip_clearances_m):
-            if clearance < 0.0:
+            if clearance < -_ROUND_OFF * self.centre_distance_m:
                 yield (
                     f"the tip of the {names[which]} cuts {-1e3 * clearance:.3f} mm into the root of the "
                     f"{names[1 - which]}: profile shifts {self.profile_shift[0]:g} and {self.profile_shift[1]:g} "

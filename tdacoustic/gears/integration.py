@@ -1,6 +1,8 @@
 """The equations integrated in time: the second, independent way to a steady state, and the only one without a period.
 
 Nothing of the harmonic balance is used: the stiffness is the trapezoid of equations (5) and (6) itself, not its series.
+Steps do not stop where the stiffness of spur teeth jumps, nor where teeth meet: there the method is of first order
+(0.4 % of the waveform of spur teeth; with a mesh damper that needs contact a settled motion may be missed).
 """
 
 from __future__ import annotations

@@ -64,6 +64,9 @@ def masuda_level_db(
     for name, value in (("ratio", ratio), ("transverse_contact_ratio", transverse_contact_ratio)):
         if not value > 0.0:
             raise GearError(f"{name} must be > 0, got {value!r}")
+    for name, value in (("helix_angle_rad", helix_angle_rad), ("power_w", power_w), ("constant_db", constant_db)):
+        if not math.isfinite(value):
+            raise GearError(f"{name} must be a number, got {value!r}")
     if not pitch_line_speed_m_s >= 0.0 or not displacement >= 0.0:
         raise GearError(
             f"pitch-line speed and displacement must be >= 0, got {pitch_line_speed_m_s!r} and {displacement!r}"

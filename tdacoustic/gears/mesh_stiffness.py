@@ -68,7 +68,8 @@ def mesh_stiffness(pair: GearGeometry) -> MeshStiffness:
     >>> round(mesh_stiffness(spur).single_n_per_m2 / 1e9, 3)
     13.55
     """
-    virtual = [teeth / math.cos(pair.helix_angle_rad) ** 3 for teeth in pair.teeth]
+    slanted = math.cos(pair.helix_angle_rad) * math.cos(pair.base_helix_angle_rad) ** 2
+    virtual = [teeth / slanted for teeth in pair.teeth]
     (x1, x2), (z1, z2) = pair.profile_shift, virtual
     terms = (1.0, 1.0 / z1, 1.0 / z2, x1, x1 / z1, x2, x2 / z2, x1**2, x2**2)
     flexibility = sum(coefficient * term for coefficient, term in zip(_SERIES, terms, strict=True))

@@ -81,8 +81,15 @@ class GearSystem:
             raise GearError(f"mesh_stiffness_n_per_m must be > 0, got {self.mesh_stiffness_n_per_m!r}")
         if not 0.0 <= self.mesh_damping_ratio <= 1.0:
             raise GearError(f"mesh_damping_ratio must be from 0 to 1, got {self.mesh_damping_ratio!r}")
-        if not self.half_backlash_m >= 0.0:
+        if not (math.isfinite(self.half_backlash_m) and self.half_backlash_m >= 0.0):
             raise GearError(f"half_backlash_m must be >= 0, got {self.half_backlash_m!r}")
+        if not all(math.isfinite(amplitude) for amplitude in self.transmission_error_m):
+            raise GearError(f"transmission_error_m must be numbers, got {self.transmission_error_m!r}")
+        for name in ("pressure_angle_rad", "base_helix_angle_rad"):
+            if not -0.5 * math.pi < getattr(self, name) < 0.5 * math.pi:
+                raise GearError(f"{name} must be below a right angle, got {getattr(self, name)!r}")
+        if self.mesh_damping not in ("always", "contact"):
+            raise GearError(f"mesh_damping must be 'always' or 'contact', got {self.mesh_damping!r}")
         if self.transmission_error_pp_m > 2.0 * self.half_backlash_m:
             raise GearError(
                 f"the transmission error, {1e6 * self.transmission_error_pp_m:.4g} um peak to peak, is larger than the "

@@ -176,7 +176,7 @@ def test_doubling_with_a_damper_that_needs_contact_is_found():
     assert np.abs(delta[-1] - delta[-2]).max() > 0.1 * swing
     assert np.abs(delta[-1] - delta[-3]).max() < 1e-3 * swing
     assert found.repeats_after == 2
-    assert found.floquet_max > 1.0
+    assert not found.is_periodic
     assert found.dte_pp_m == pytest.approx(swing, rel=2e-3)
 
 

@@ -41,15 +41,16 @@ def record():
 
 
 def test_the_balance_agrees_with_the_integration(motions, rows):
-    """The study's largest are 0.4e-4 and 1.1e-3; a motion that another machine judges otherwise drops out."""
+    """The study's largest are 0.2e-4 for the balance and 1.2e-4 for the integration at its default steps; stiffness
+    harmonics wrong by 1 % are out of the band. A motion that another machine judges otherwise drops out.
+    """
     compared = [row for row in rows if row["left_out"] is None]
     assert len([row for row in compared if not row["separates"]]) >= 8
     assert len([row for row in compared if row["separates"]]) >= 1
     for row in compared:
-        bound = 2.0 * (motions.SEPARATING if row["separates"] else motions.IN_CONTACT)
-        assert row["balance"] < bound, row
-        assert row["bearing_line"] < bound, row
-        assert row["integration"] < bound, row
+        assert row["balance"] < motions.IN_CONTACT, row
+        assert row["bearing_line"] < motions.IN_CONTACT, row
+        assert row["integration"] < motions.SEPARATING, row
 
 
 def test_what_is_left_out_has_a_reason_of_the_motion(rows):
@@ -66,14 +67,14 @@ def test_the_record_holds_the_bounds(motions, record):
     assert study["in_contact"]["n"] >= 150
     assert study["with_separation"]["n"] >= 20
     assert study["left_out"]["part"] < 0.2
-    assert study["in_contact"]["balance"]["max"] < motions.IN_CONTACT
-    assert study["in_contact"]["bearing_line"]["max"] < motions.IN_CONTACT
-    assert study["with_separation"]["balance"]["max"] < motions.SEPARATING
     for group in motions.GROUPS:
-        assert record[group]["in_contact"]["balance"]["max"] < motions.IN_CONTACT
+        for figure in ("balance", "each_other", "bearing_line"):
+            assert record[group]["with_separation"][figure]["max"] < motions.SEPARATING
         for figure in ("balance", "bearing_line"):
-            assert record[group]["with_separation"][figure]["p90"] < motions.SEPARATING
-            assert record[group]["with_separation"][figure]["max"] < 2.0 * motions.SEPARATING
+            assert record[group]["in_contact"][figure]["max"] < motions.IN_CONTACT
+        # The integration's own error at its default steps is the larger one, in one motion of 287 that of near-spur
+        # teeth beyond 1e-4.
+        assert record[group]["in_contact"]["each_other"]["p99"] < motions.IN_CONTACT
 
 
 def test_the_record_is_of_these_sources(motions, record):
