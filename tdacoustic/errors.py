@@ -8,11 +8,14 @@ allowed and where it stands (file, channel, key).
 __all__ = [
     "AnalysisError",
     "CampaignError",
+    "FittingError",
     "FleetError",
     "FormatError",
     "GearError",
     "MissingFileError",
+    "MotorError",
     "OutputError",
+    "RadiationError",
     "RecipeError",
     "StoreError",
     "TdacousticError",
@@ -43,12 +46,24 @@ class CampaignError(TdacousticError, ValueError):
     """A campaign file is wrong: unknown key, bad value, or contradiction."""
 
 
+class FittingError(TdacousticError, ValueError):
+    """A calibration that cannot be set up, or has nothing to work on."""
+
+
 class FleetError(TdacousticError, ValueError):
     """A fleet file is wrong, or lacks a parameter that is needed."""
 
 
 class GearError(TdacousticError, ValueError):
     """Gears that cannot be made or cannot mesh, or a state of them that cannot be computed."""
+
+
+class MotorError(TdacousticError, ValueError):
+    """A motor that cannot be computed."""
+
+
+class RadiationError(TdacousticError, ValueError):
+    """A sound field that cannot be computed."""
 
 
 class RecipeError(TdacousticError, ValueError):

@@ -2,16 +2,23 @@
 
 from tdacoustic.drive.conditions import Condition, conditions_of, torque_at
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
+from tdacoustic.drive.levels import LevelAt, Receiver
 from tdacoustic.drive.model import DriveModel
-from tdacoustic.drive.prediction import GearState, HelixCase, Prediction, SpeedSweep
+from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase, Prediction, SpeedSweep
+from tdacoustic.drive.sources import SoundSource
 
 __all__ = [
     "Condition",
+    "Directivity",
     "DriveModel",
+    "DriveSound",
     "GearState",
     "GearUnit",
     "HelixCase",
+    "LevelAt",
     "Prediction",
+    "Receiver",
+    "SoundSource",
     "SpeedSweep",
     "conditions_of",
     "gear_unit_of",

@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from typing import Literal
+
+import numpy as np
 
 from tdacoustic.drive.conditions import Condition, conditions_of
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
-from tdacoustic.drive.prediction import GearState, HelixCase, Prediction
+from tdacoustic.drive.levels import PointField, Receiver
+from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase, Prediction
+from tdacoustic.drive.sources import MotorSources, mesh_source
 from tdacoustic.errors import FleetError, GearError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import bearing_forces, masuda_level_db, steady_state
@@ -34,24 +39,84 @@ class DriveModel:
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
         self.unit = gear_unit_of(fleet)
+        self._motor = MotorSources(fleet)
+        self._field = PointField(fleet)
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
         """Those of ``[operation]``."""
         return conditions_of(self.fleet)
 
-    def evaluate(self, conditions: Iterable[Condition] | None = None) -> Prediction:
+    def evaluate(self, conditions: Iterable[Condition] | None = None, receivers: Sequence[Receiver] = ()) -> Prediction:
         """Return the prediction for conditions, and for the helix angles of ``[operation]`` at the fastest of them.
+
+        A fleet that names no angles gets its own alone.
 
         Parameters
         ----------
         conditions : iterable of Condition, optional
             Default: those of ``[operation]``.
+        receivers : sequence of Receiver
+            Where levels are wanted besides the surface of ``[radiation] sphere_radius_m``.
         """
         held = self.conditions if conditions is None else tuple(conditions)
         states = tuple(self.gears(condition) for condition in held)
-        helix = self._helix_cases(max(held, key=lambda condition: condition.motor_hz)) if held else ()
-        return Prediction(self.unit, states, helix, None, tuple(self._doubts(states, helix)))
+        sound = tuple(self.sound(state, receivers) for state in states)
+        helix = self._helix_cases(max(held, key=lambda condition: condition.motor_hz), receivers) if held else ()
+        around = [
+            *(
+                self._around("speed", state.condition.train_speed_km_h, s)
+                for state, s in zip(states, sound, strict=True)
+            ),
+            *(self._around("helix", case.helix_angle_deg, case.sound) for case in helix),
+        ]
+        doubts = (*self._doubts(states, helix), *self._sound_doubts(sound))
+        return Prediction(
+            self.unit, states, sound, self._field.surface.name, tuple(around), helix, None, tuple(dict.fromkeys(doubts))
+        )
+
+    def sound(self, state: GearState, receivers: Sequence[Receiver] = ()) -> DriveSound:
+        """Return the drive's sound where the gears are in a state.
+
+        Parameters
+        ----------
+        state : GearState
+        receivers : sequence of Receiver
+            Besides the surface.
+        """
+        mesh = mesh_source(self.fleet, state.mesh_hz, state.masuda_db)
+        sources = (*self._motor.at(state.condition), *((mesh,) if mesh is not None else ()))
+        levels = self._field.levels(sources, (self._field.surface, *receivers))
+        return DriveSound(state.condition.name, sources, levels)
+
+    def _around(self, sweep: Literal["speed", "helix"], value: float, sound: DriveSound) -> Directivity:
+        angles = np.arange(0.0, 360.0, 5.0)
+        return Directivity(sweep, value, angles, self._field.around_db(sound.sources, angles))
+
+    def _sound_doubts(self, sound: tuple[DriveSound, ...]) -> Iterator[str]:
+        gear_path, placement = self.fleet.model.gear_path.value, self.fleet.masuda.placement.value
+        if self.fleet.radiation.method.value != "point_sources":
+            yield "boundary elements are not there yet: the field is that of point sources"
+        if gear_path != "masuda":
+            yield (
+                f'gear_path = "{gear_path}": the bearing forces\' way through the housing is not there yet, so the '
+                "total lacks it"
+            )
+        if placement == "inside" and gear_path != "structure":
+            yield (
+                "Masuda's source is put inside the housing, whose insertion loss is not there yet: the total holds "
+                "nothing of it, and its constant cannot be seen in a level outside"
+            )
+        if placement == "off":
+            yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
+        unknown = self._motor.without_amplitude
+        if unknown:
+            yield (
+                f"excitation{'s' if len(unknown) > 1 else ''} {', '.join(unknown)} of the motor: neither flux "
+                "densities nor a sound power level, so no sound of theirs is in the levels"
+            )
+        if not any(s.path == "motor" for one in sound for s in one.sources):
+            yield "the motor makes no sound in this model: the levels are those of the gears alone"
 
     def gears(self, condition: Condition, unit: GearUnit | None = None) -> GearState:
         """Return the gears in one condition.
@@ -84,13 +149,14 @@ class DriveModel:
             return 1e6 * dte_pp_m
         return dte_pp_m / abs(static_compression_m) if static_compression_m else 0.0
 
-    def _helix_cases(self, condition: Condition) -> tuple[HelixCase, ...]:
+    def _helix_cases(self, condition: Condition, receivers: Sequence[Receiver]) -> tuple[HelixCase, ...]:
         stated = self.fleet.operation.helix_angle_deg
         cases = []
-        for angle_deg in stated.value if stated is not None else ():
+        own_deg = math.degrees(self.unit.geometry.helix_angle_rad)
+        for angle_deg in stated.value if stated is not None else (own_deg,):
             unit = gear_unit_of(self.fleet, math.radians(angle_deg))
             gears = self.gears(replace(condition, name=f"{condition.name}, {angle_deg:g}°"), unit)
-            cases.append(HelixCase(angle_deg, unit, gears))
+            cases.append(HelixCase(angle_deg, unit, gears, self.sound(gears, receivers)))
         return tuple(cases)
 
     def _doubts(self, states: tuple[GearState, ...], helix: tuple[HelixCase, ...]) -> Iterator[str]:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tdacoustic.drive.conditions import Condition
 from tdacoustic.drive.gear_unit import GearUnit
+from tdacoustic.drive.levels import LevelAt
+from tdacoustic.drive.sources import SoundSource
 from tdacoustic.gears import BearingForces, Branch, SteadyState
+from tdacoustic.radiation import overall_level_db
 
-__all__ = ["GearState", "HelixCase", "Prediction", "SpeedSweep"]
+__all__ = ["Directivity", "DriveSound", "GearState", "HelixCase", "Prediction", "SpeedSweep"]
 
 
 @dataclass(frozen=True)
@@ -34,6 +41,55 @@ class GearState:
 
 
 @dataclass(frozen=True)
+class DriveSound:
+    """The drive's sound in one condition.
+
+    Parameters
+    ----------
+    condition : str
+    sources : tuple of SoundSource
+        Tones of the motor, and the meshing noise.
+    levels : tuple of LevelAt
+        Of each path and of the total, on the surface of ``[radiation] sphere_radius_m`` and at each receiver.
+    """
+
+    condition: str
+    sources: tuple[SoundSource, ...]
+    levels: tuple[LevelAt, ...]
+
+    def level_db(self, receiver: str, path: str = "total", weighting: str = "Z") -> float | None:
+        """Return one of the levels; None of a path without sound."""
+        for level in self.levels:
+            if (level.receiver, level.path, level.weighting) == (receiver, path, weighting):
+                return level.level_db
+        return None
+
+    @property
+    def motor_sound_power_level_db(self) -> float | None:
+        """Of all tones of the motor together, re 1 pW; None of a silent one."""
+        return overall_level_db([s.sound_power_level_db for s in self.sources if s.path == "motor"])
+
+
+@dataclass(frozen=True)
+class Directivity:
+    """The total level around the circle of ``[radiation] circle_radius_m``, in the plane z = 0.
+
+    Parameters
+    ----------
+    sweep : {"speed", "helix"}
+    value : float
+        Train speed in km/h, or helix angle in degrees.
+    angle_deg, level_db : ndarray, shape (72,)
+        From x towards y, every 5°; NaN of no sound.
+    """
+
+    sweep: Literal["speed", "helix"]
+    value: float
+    angle_deg: NDArray[np.float64]
+    level_db: NDArray[np.float64]
+
+
+@dataclass(frozen=True)
 class HelixCase:
     """One helix angle of the helix sweep; rack, teeth, shifts and face width stay.
 
@@ -42,11 +98,13 @@ class HelixCase:
     helix_angle_deg : float
     unit : GearUnit
     gears : GearState
+    sound : DriveSound
     """
 
     helix_angle_deg: float
     unit: GearUnit
     gears: GearState
+    sound: DriveSound
 
 
 @dataclass(frozen=True)
@@ -75,6 +133,12 @@ class Prediction:
     unit : GearUnit
     conditions : tuple of GearState
         In the order of ``[operation]``.
+    sound : tuple of DriveSound
+        Of each of them.
+    surface : str
+        Name of the surface among the receivers, as ``"4 m"``.
+    directivity : tuple of Directivity
+        Of each condition and helix angle.
     helix : tuple of HelixCase
         At the fastest condition; empty where the fleet names no angles.
     sweep : SpeedSweep or None
@@ -84,6 +148,13 @@ class Prediction:
 
     unit: GearUnit
     conditions: tuple[GearState, ...]
+    sound: tuple[DriveSound, ...]
+    surface: str
+    directivity: tuple[Directivity, ...]
     helix: tuple[HelixCase, ...]
     sweep: SpeedSweep | None
     doubts: tuple[str, ...]
+
+    def sound_of(self, condition: str) -> DriveSound | None:
+        """Return the drive's sound in a condition, or None where it was not computed."""
+        return next((sound for sound in self.sound if sound.condition == condition), None)

@@ -13,6 +13,7 @@ from tdacoustic.reporting.sections.mesh_stiffness import mesh_stiffness
 from tdacoustic.reporting.sections.meshing_noise import meshing_noise
 from tdacoustic.reporting.sections.model_parameters import model_parameters
 from tdacoustic.reporting.sections.printed import PAPER
+from tdacoustic.reporting.sections.sound_field import sound_field
 from tdacoustic.reporting.sections.speed_sweep import speed_sweep
 from tdacoustic.reporting.sections.transmission_error import transmission_error
 from tdacoustic.results import FleetPrediction
@@ -28,12 +29,21 @@ def predicted_report(result: FleetPrediction) -> Document:
     result : FleetPrediction
     """
     prediction = result.prediction
-    found = [gear_pair, mesh_stiffness, transmission_error, bearing_loads, speed_sweep, meshing_noise, helix_sweep]
+    found = [
+        gear_pair,
+        mesh_stiffness,
+        transmission_error,
+        bearing_loads,
+        speed_sweep,
+        meshing_noise,
+        sound_field,
+        helix_sweep,
+    ]
     sections = [section for section in (make(result) for make in found) if section is not None]
     speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
     return Document(
         title=result.fleet.name,
-        subtitle="Noise and vibration of a traction drive: what the rapid model of its gears gives",
+        subtitle="Noise and vibration of a traction drive: what the rapid model gives",
         origin="calculated",
         summary=gear_answer(result),
         sections=[*sections, model_parameters(result), gear_method(result)],

@@ -26,7 +26,7 @@ class FleetPrediction:
     fleet : Fleet
     prediction : Prediction
     tables : mapping of str to DataFrame
-        ``conditions``, ``bearing_forces``, ``helix``, ``speed_sweep``.
+        ``conditions``, ``predictions``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``.
     sha256 : str
         Of the fleet file.
     records : tuple of (str, Record)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from tdacoustic.drive import GearState, HelixCase, Prediction, SpeedSweep
+from tdacoustic.drive import Directivity, DriveSound, GearState, HelixCase, Prediction, SpeedSweep
 from tdacoustic.gears import DIRECTIONS, GEARS, Branch, SteadyState
 from tdacoustic.tables.frames import Row, frame_of
 
@@ -22,10 +22,10 @@ HARMONICS_AT_LEAST = 10
 
 
 def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.DataFrame]:
-    """Return ``conditions``, ``bearing_forces``, ``helix`` and ``speed_sweep`` as frames.
+    """Return the tables of a prediction as frames, by name.
 
-    Columns of parts that the model does not have are empty; ``helix`` and ``speed_sweep`` are left out where they were
-    not computed.
+    ``conditions``, ``predictions``, ``directivity``, ``bearing_forces``, ``helix`` and ``speed_sweep``; the last is
+    left out where it was not computed. Columns of parts that the model does not have are empty.
 
     Parameters
     ----------
@@ -34,11 +34,15 @@ def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.
         Up to which forces are listed.
     """
     rows: dict[str, Iterable[Row]] = {
-        "conditions": (_condition_row(state) for state in prediction.conditions),
+        "conditions": (
+            _condition_row(state, sound, prediction.surface)
+            for state, sound in zip(prediction.conditions, prediction.sound, strict=True)
+        ),
+        "predictions": (row for sound in prediction.sound for row in _level_rows(sound)),
+        "directivity": (row for around in prediction.directivity for row in _around_rows(around)),
         "bearing_forces": (row for state in prediction.conditions for row in _force_rows(state, highest_hz)),
     }
-    if prediction.helix:
-        rows["helix"] = (_helix_row(case) for case in prediction.helix)
+    rows["helix"] = (_helix_row(case, prediction.surface) for case in prediction.helix)
     if prediction.sweep is not None:
         rows["speed_sweep"] = _sweep_rows(prediction.sweep)
     return {name: frame_of(name, table) for name, table in rows.items()}
@@ -58,7 +62,7 @@ def _known(value: float) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def _condition_row(state: GearState) -> Row:
+def _condition_row(state: GearState, sound: DriveSound, surface: str) -> Row:
     condition, steady = state.condition, state.steady
     return {
         "condition": condition.name,
@@ -67,6 +71,9 @@ def _condition_row(state: GearState) -> Row:
         "mesh_frequency_hz": state.mesh_hz,
         "torque_n_m": condition.torque_n_m,
         "masuda_spl_1m_db": state.masuda_db,
+        "motor_sound_power_level_db": sound.motor_sound_power_level_db,
+        **{f"{path}_spl_4m_db": sound.level_db(surface, path) for path in ("structure", "mesh", "motor")},
+        "spl_4m_db": sound.level_db(surface),
         "mode": condition.mode,
         "power_kw": 1e-3 * condition.power_w,
         "repeats_after_mesh_periods": steady.repeats_after,
@@ -74,6 +81,27 @@ def _condition_row(state: GearState) -> Row:
         "static_compression_um": 1e6 * steady.static_compression_m,
         **_motion(steady),
     }
+
+
+def _level_rows(sound: DriveSound) -> Iterator[Row]:
+    for level in sound.levels:
+        yield {
+            "condition": sound.condition,
+            "receiver": level.receiver,
+            "path": level.path,
+            "weighting": level.weighting,
+            "level_db": level.level_db,
+        }
+
+
+def _around_rows(around: Directivity) -> Iterator[Row]:
+    for angle, level in zip(around.angle_deg, around.level_db, strict=True):
+        yield {
+            "sweep": around.sweep,
+            "value": around.value,
+            "angle_deg": float(angle),
+            "spl_12m_db": _known(float(level)),
+        }
 
 
 def _force_rows(state: GearState, highest_hz: float) -> Iterator[Row]:
@@ -103,12 +131,13 @@ def _force_rows(state: GearState, highest_hz: float) -> Iterator[Row]:
                 }
 
 
-def _helix_row(case: HelixCase) -> Row:
+def _helix_row(case: HelixCase, surface: str) -> Row:
     geometry = case.unit.geometry
     return {
         "helix_angle_deg": case.helix_angle_deg,
         "centre_distance_mm": 1e3 * geometry.centre_distance_m,
         "masuda_spl_1m_db": case.gears.masuda_db,
+        "spl_4m_db": case.sound.level_db(surface),
         "condition": case.gears.condition.name,
         "mesh_frequency_hz": case.gears.mesh_hz,
         "transverse_contact_ratio": geometry.transverse_contact_ratio,

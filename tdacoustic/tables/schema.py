@@ -22,6 +22,8 @@ COLUMNS: Final = MappingProxyType(
         "conditions": "condition train_speed_km_h motor_speed_rpm mesh_frequency_hz torque_n_m dte_pp_um floquet_max "
         "masuda_spl_1m_db motor_sound_power_level_db structure_spl_4m_db mesh_spl_4m_db motor_spl_4m_db spl_4m_db "
         "mode power_kw method periodic repeats_after_mesh_periods contact_part static_compression_um",
+        "predictions": "condition receiver path weighting level_db",
+        "directivity": "sweep value angle_deg spl_12m_db",
         "bearing_forces": "condition gear direction harmonic frequency_hz force_amplitude_n phase_deg",
         "helix": "helix_angle_deg centre_distance_mm dte_pp_um masuda_spl_1m_db spl_4m_db condition mesh_frequency_hz "
         "transverse_contact_ratio overlap_ratio floquet_max method periodic",
@@ -39,7 +41,7 @@ TEXT_COLUMNS: Final = frozenset(
         *("check", "verdict", "detail"),
         *("radiator", "excitation", "source", "evidence", "weighting", "dominant", "dominant_excitation"),
         *("order_name", "leading", "speed_source", "causes"),
-        *("mode", "method", "gear", "direction"),
+        *("mode", "method", "gear", "direction", "receiver", "path", "sweep"),
     }
 )
 """Columns that hold words, even where the words are digits."""

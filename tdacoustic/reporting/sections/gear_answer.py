@@ -26,14 +26,15 @@ from tdacoustic.reporting.sections.helix_sweep import helix_words
 from tdacoustic.reporting.sections.loads_over_speed import largest_words, rise_words
 from tdacoustic.reporting.sections.meshing_noise import reading_words
 from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
+from tdacoustic.reporting.sections.sound_field import sound_words
 from tdacoustic.reporting.sections.speed_sweep import sweep_words
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["gear_answer", "regime_words"]
 
 SCOPE = (
-    "Computed are the gears on their bearings and Masuda's meshing noise; the motor, the housing and the sound around "
-    "the drive are not."
+    "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
+    "them, and the level around these as point sources; the housing is not."
 )
 
 
@@ -48,7 +49,7 @@ def gear_answer(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
     blocks: list[Block] = [
         Paragraph(f"{regime_words(result)} {SCOPE}"),
-        Sentences([_of_condition(result.fleet, state) for state in states]),
+        Sentences([_of_condition(result.fleet, state, sound_words(result, state)) for state in states]),
     ]
     if any(state.masuda_db is not None for state in states):
         blocks.append(Paragraph(f"{TERMS} {reading_words(result.fleet)}"))
@@ -101,20 +102,20 @@ def _of_the_test(result: FleetPrediction) -> str:
     return text
 
 
-def _of_condition(fleet: Fleet, state: GearState) -> str:
+def _of_condition(fleet: Fleet, state: GearState, around: str) -> str:
     condition, steady = state.condition, state.steady
     start = f"{state_words(state)}: mesh frequency {hertz(state.mesh_hz)}, {_torque(condition.torque_n_m)}"
     if steady.method == "at_rest":
-        return sentence(
-            f"{start}; the teeth of the model do not touch, so there is no vibration, no force and no meshing noise"
-        )
+        rest = "the teeth of the model do not touch, so there is no vibration, no force and no meshing noise"
+        return sentence("; ".join(part for part in (start, rest, around) if part))
     parts = [f"DTE {micrometres(steady.dte_pp_m)} peak to peak"]
     largest = largest_line(state)
     if largest is not None:
         gear, direction, force, frequency = largest
         parts.append(f"largest bearing force {newtons(force)} at {hertz(frequency)} ({gear}, {direction})")
     if state.masuda_db is not None:
-        parts.append(f"Masuda's level {state.masuda_db:.1f} {level_unit(fleet)}")
+        parts.append(f"Masuda's level {state.masuda_db:.1f} {level_unit(fleet)} at 1 m")
+    parts += [around] if around else []
     return sentence(f"{start}; {', '.join(parts)}. {sentence(motion_words(steady))}")
 
 

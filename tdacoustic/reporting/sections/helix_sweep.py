@@ -18,7 +18,7 @@ __all__ = ["helix_sweep", "helix_words"]
 def helix_sweep(result: FleetPrediction) -> Section | None:
     """Return the section on the helix sweep, or None where the fleet names no angles."""
     cases = sorted(result.prediction.helix, key=lambda case: case.helix_angle_deg)
-    if not cases:
+    if result.fleet.operation.helix_angle_deg is None or not cases:
         return None
     angles = np.array([case.helix_angle_deg for case in cases])
     blocks: list[Block] = [Paragraph(_method(cases[0])), _table(result, cases)]
@@ -41,7 +41,7 @@ def helix_sweep(result: FleetPrediction) -> Section | None:
 def helix_words(result: FleetPrediction) -> str:
     """Return what the helix sweep found in a sentence, empty without one or where nothing moves."""
     cases = [case for case in result.prediction.helix if case.gears.steady.dte_pp_m > 0.0]
-    if len(cases) < 2:
+    if result.fleet.operation.helix_angle_deg is None or len(cases) < 2:
         return ""
     least, most = (pick(cases, key=lambda case: case.gears.steady.dte_pp_m) for pick in (min, max))
     distances = [1e3 * case.unit.geometry.centre_distance_m for case in cases]

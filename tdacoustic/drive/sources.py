@@ -1,0 +1,165 @@
+"""Point sources of a drive: the motor's lines, and the meshing noise at the gears."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from tdacoustic.drive.conditions import Condition
+from tdacoustic.errors import FleetError, MotorError
+from tdacoustic.fleet import Fleet, Kinematics, MotorExcitation
+from tdacoustic.gears.masuda import SPHERE_OF_1_M_DB
+from tdacoustic.motor import MotorFrame, Ring
+from tdacoustic.radiation import Air
+from tdacoustic.spectra.weighting import a_weighting_db
+
+__all__ = ["MotorSources", "SoundSource", "mesh_source"]
+
+_REFERENCE_W = 1e-12
+_CENTRE = (0.0, 0.0, 0.0)
+
+_FRAME_KEYS = (
+    *(f"{part}_{what}_mm" for part in ("core", "frame") for what in ("radius", "length", "thickness")),
+    *("frame_modulus_gpa", "core_modulus_gpa", "density_kg_m3", "loss_factor"),
+)
+
+
+@dataclass(frozen=True)
+class SoundSource:
+    """A tone of a point source.
+
+    Parameters
+    ----------
+    path : {"motor", "mesh"}
+    name : str
+        Of the excitation.
+    frequency_hz : float
+    sound_power_level_db : float
+        Unweighted, re 1 pW.
+    position_m : (float, float, float)
+        In the drive's frame.
+    """
+
+    path: Literal["motor", "mesh"]
+    name: str
+    frequency_hz: float
+    sound_power_level_db: float
+    position_m: tuple[float, float, float] = _CENTRE
+
+
+class MotorSources:
+    """The motor of a fleet as a list of tones at each speed.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        Its motor may be absent, or may name excitations without amplitude: these are known lines of unknown strength
+        and are left out.
+
+    Raises
+    ------
+    FleetError
+        An excitation has flux densities, but the motor lacks a parameter that its vibration needs.
+    """
+
+    def __init__(self, fleet: Fleet) -> None:
+        self._fleet = fleet
+        self._kinematics = Kinematics.of(fleet)
+        self._air = Air(fleet.number("radiation.temperature_degc"))
+        motor = fleet.motor
+        self._excitations: tuple[MotorExcitation, ...] = () if motor is None else motor.excitation
+        needs_frame = any(excitation.flux_density_t is not None for excitation in self._excitations)
+        self.frame = _frame(fleet) if needs_frame else None
+        position = None if motor is None else motor.position_m
+        self._position_m = _CENTRE if position is None else position.value
+
+    @property
+    def without_amplitude(self) -> tuple[str, ...]:
+        """Names of excitations whose strength the fleet does not say."""
+        return tuple(
+            excitation.name
+            for excitation in self._excitations
+            if excitation.flux_density_t is None and excitation.sound_power_level_db is None
+        )
+
+    def at(self, condition: Condition) -> tuple[SoundSource, ...]:
+        """Return the motor's tones in a condition, by their order in the fleet.
+
+        Raises
+        ------
+        FleetError
+            An excitation cannot be computed.
+        """
+        found = []
+        for excitation in self._excitations:
+            frequency_hz = self._frequency_hz(excitation, condition.motor_hz)
+            if frequency_hz is None or frequency_hz <= 0.0:
+                continue
+            level_db = self._level_db(excitation, frequency_hz, 60.0 * condition.motor_hz)
+            if level_db is not None:
+                found.append(SoundSource("motor", excitation.name, frequency_hz, level_db, self._position_m))
+        return tuple(found)
+
+    def _frequency_hz(self, excitation: MotorExcitation, motor_hz: float) -> float | None:
+        a, b, c, d = excitation.terms
+        carrier_hz, supply_hz = self._kinematics.carrier_hz(motor_hz), self._kinematics.supply_hz(motor_hz)
+        if (a and carrier_hz is None) or (b and supply_hz is None):
+            return None
+        return a * (carrier_hz or 0.0) + b * (supply_hz or 0.0) + c * motor_hz + d
+
+    def _level_db(self, excitation: MotorExcitation, frequency_hz: float, motor_speed_rpm: float) -> float | None:
+        if excitation.flux_density_t is None:
+            return excitation.sound_power_level_db_at(motor_speed_rpm)
+        flux = excitation.flux_density_t_at(motor_speed_rpm)
+        if flux is None or min(flux) <= 0.0:
+            return None
+        assert self.frame is not None
+        where = f"{self._fleet.path}: [[motor.excitation]] {excitation.name}"
+        if excitation.order is None:
+            raise FleetError(f"{where}: order is missing, and its flux densities need it")
+        air, standing = self._air, excitation.standing.value
+        try:
+            power_w = self.frame.sound_power_w(
+                excitation.order.value, frequency_hz, flux, air.impedance_pa_s_m, air.sound_speed_m_s, standing
+            )
+        except MotorError as error:
+            raise FleetError(f"{where}: {error}") from error
+        return 10.0 * math.log10(power_w / _REFERENCE_W) if power_w > 0.0 else None
+
+
+def _frame(fleet: Fleet) -> MotorFrame:
+    values = {key: fleet.number(f"motor.{key}") for key in _FRAME_KEYS}
+    motor = fleet.motor
+    added_kg = 0.0 if motor is None or motor.added_mass_kg is None else motor.added_mass_kg.value
+    rings = {}
+    for part, added in (("core", added_kg), ("frame", 0.0)):
+        rings[part] = Ring(
+            values[f"{part}_radius_mm"],
+            values[f"{part}_length_mm"],
+            values[f"{part}_thickness_mm"],
+            values[f"{part}_modulus_gpa"],
+            values["density_kg_m3"],
+            added,
+        )
+    return MotorFrame(rings["core"], rings["frame"], values["loss_factor"])
+
+
+def mesh_source(fleet: Fleet, mesh_hz: float, masuda_db: float | None) -> SoundSource | None:
+    """Return the meshing noise as a tone at the mesh frequency; None where Masuda's formula has no level.
+
+    The formula's level at 1 m is of a point source: its sound power level is 11 dB more. Where it is read as
+    A-weighted the weighting at the mesh frequency is taken off again.
+
+    Parameters
+    ----------
+    fleet : Fleet
+        For the reading of ``[masuda]``.
+    mesh_hz : float
+    masuda_db : float or None
+        At 1 m, in that reading.
+    """
+    if masuda_db is None:
+        return None
+    weighted_db = float(a_weighting_db(mesh_hz)) if fleet.masuda.weighting.value == "A" else 0.0
+    return SoundSource("mesh", "mesh", mesh_hz, masuda_db - weighted_db + SPHERE_OF_1_M_DB)
