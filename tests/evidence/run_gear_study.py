@@ -1,6 +1,6 @@
 """Compare the two ways to a steady state on random conditions (gear_motions.py), and record what came out.
 
-`python tests/evidence/run_gear_study.py --record tests/evidence/gear_record.json --jobs 2`, about five minutes.
+`python tests/evidence/run_gear_study.py --record tests/evidence/gear_record.json --jobs 2`, about six minutes.
 """
 
 from __future__ import annotations
@@ -65,6 +65,8 @@ def main() -> None:
         rows[group] = run(group, arguments.jobs)
         record[group] = scores(rows[group])
         print(f"{group}: {time.perf_counter() - start:.0f} s\n{json.dumps(record[group], indent=1)}")
+    if sources() != record["sources_sha256"]:
+        sys.exit("the sources changed during the run: nothing is written")
     for path, content in ((arguments.record, record), (arguments.rows, rows)):
         if path is not None:
             path.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
