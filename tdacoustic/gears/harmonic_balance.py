@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.gears.system import GearSystem
 
-__all__ = ["HarmonicSolution", "balance", "bonded_solution", "periodic_solution"]
+__all__ = ["HarmonicSolution", "balance", "periodic_solution"]
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -297,11 +297,6 @@ def balance(
     common = min(start.size, n_harmonics + 1)
     fitted[:common] = start[:common]
     return held.newton(fitted)
-
-
-def bonded_solution(system: GearSystem, mesh_hz: float, mean_force_n: float) -> HarmonicSolution:
-    """Return the motion of teeth that cannot separate, with few harmonics: where Newton's method starts."""
-    return _Balance(system, mesh_hz, mean_force_n, max(FEWEST_HARMONICS, 2 * len(system.transmission_error_m))).bonded()
 
 
 def periodic_solution(

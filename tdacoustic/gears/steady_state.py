@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import GearError
 from tdacoustic.gears.floquet import floquet_multipliers, samples_of_period
-from tdacoustic.gears.harmonic_balance import HarmonicSolution, bonded_solution, periodic_solution
-from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, TimeSolution, settle
+from tdacoustic.gears.harmonic_balance import HarmonicSolution, periodic_solution
+from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, TimeSolution, integrate, settle
 from tdacoustic.gears.lines import Lines, lines_of_harmonics, lines_of_record, lines_of_repeat
 from tdacoustic.gears.system import GearSystem
 
@@ -23,9 +23,9 @@ STABLE: Final = 1.0 + 1e-6
 """Largest Floquet multiplier of a solution that is taken; beyond it the time integration takes over. Without any
 damping multipliers lie on the unit circle, up to the round-off of the monodromy matrix."""
 
-STARTS: Final = (1.0, -0.5, 0.6)
-"""Of Newton's method: what the harmonics of teeth that cannot separate are multiplied with. Beyond its resonance a
-separating motion is in opposite phase; of 60 random motions that separate, these reached 56."""
+FIRST_PERIODS: Final = 16
+"""Mesh periods integrated from rest whose last one is where Newton's method starts when teeth separate. From there it
+reached all of 84 random motions that separate and repeat; from teeth that cannot separate alone, 57."""
 
 WAVEFORM_SAMPLES: Final = 512
 """Samples of δ kept of a mesh period."""
@@ -178,11 +178,9 @@ def _starts(
             yield np.fft.rfft(start.waveform_m[0], norm="forward")
         return
     yield None
-    bonded = bonded_solution(system, mesh_hz, force)
-    for factor in STARTS[1:]:
-        scaled = bonded.displacement_m.copy()
-        scaled[1:] *= factor
-        yield scaled
+    torque_n_m = force * system.base_radii_m[0] * math.cos(system.base_helix_angle_rad)
+    first = integrate(system, mesh_hz, torque_n_m, FIRST_PERIODS)
+    yield np.fft.rfft(first.displacement_m[-1], norm="forward")
 
 
 def _from_time(system: GearSystem, force: float, settled: TimeSolution) -> Judged | None:
