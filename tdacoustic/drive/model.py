@@ -17,7 +17,7 @@ from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, Heli
 from tdacoustic.drive.sources import MotorSources, mesh_source
 from tdacoustic.errors import FleetError, GearError
 from tdacoustic.fleet import Fleet
-from tdacoustic.gears import bearing_forces, masuda_level_db, steady_state
+from tdacoustic.gears import SteadyState, bearing_forces, masuda_level_db, steady_state
 from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
 
 __all__ = ["DriveModel"]
@@ -29,6 +29,8 @@ class DriveModel:
     Parameters
     ----------
     fleet : Fleet
+    unit : GearUnit, optional
+        Its gears, where they are known already.
 
     Raises
     ------
@@ -36,9 +38,9 @@ class DriveModel:
         The fleet lacks what the model needs, or its gears cannot be.
     """
 
-    def __init__(self, fleet: Fleet) -> None:
+    def __init__(self, fleet: Fleet, unit: GearUnit | None = None) -> None:
         self.fleet = fleet
-        self.unit = gear_unit_of(fleet)
+        self.unit = unit or gear_unit_of(fleet)
         self._motor = MotorSources(fleet)
         self._field = PointField(fleet)
 
@@ -118,7 +120,7 @@ class DriveModel:
         if not any(s.path == "motor" for one in sound for s in one.sources):
             yield "the motor makes no sound in this model: the levels are those of the gears alone"
 
-    def gears(self, condition: Condition, unit: GearUnit | None = None) -> GearState:
+    def gears(self, condition: Condition, unit: GearUnit | None = None, steady: SteadyState | None = None) -> GearState:
         """Return the gears in one condition.
 
         Parameters
@@ -126,11 +128,13 @@ class DriveModel:
         condition : Condition
         unit : GearUnit, optional
             Default: the fleet's.
+        steady : SteadyState, optional
+            Their motion, where it is known already.
         """
         unit = unit or self.unit
         mesh_hz = unit.mesh_hz(condition.motor_hz)
         try:
-            steady = steady_state(unit.system, mesh_hz, unit.pinion_torque_n_m(condition.torque_n_m))
+            steady = steady or steady_state(unit.system, mesh_hz, unit.pinion_torque_n_m(condition.torque_n_m))
         except GearError as error:
             raise FleetError(f"{self.fleet.path}: condition {condition.name}: {error}") from error
         level_db = masuda_level_db(

@@ -1,0 +1,6 @@
+"""Calibration: parameters of a fleet fitted to measured levels, and what the data can and cannot tell of them."""
+
+from tdacoustic.fitting.least_squares import Fit, fit
+from tdacoustic.fitting.parameters import FreeParameter
+
+__all__ = ["Fit", "FreeParameter", "fit"]

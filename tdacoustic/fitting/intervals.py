@@ -1,0 +1,94 @@
+"""Intervals of fitted parameters by profile likelihood, through lmfit."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from tdacoustic.fitting.least_squares import Fit, Residuals, fit
+from tdacoustic.fitting.parameters import FreeParameter
+
+__all__ = ["ProfileInterval", "profile_intervals"]
+
+Z_95: Final = 1.959963984540054
+_STEPS: Final = 40
+_CLOSE: Final = 1e-3
+
+ProfileInterval = tuple[float | None, float | None]
+"""Lower and upper end; None where the bound comes before the end of the interval."""
+
+
+def profile_intervals(residuals: Residuals, found: Fit, z: float = Z_95) -> dict[str, ProfileInterval]:
+    """Return the profile-likelihood interval of each moved parameter, in its own unit.
+
+    An end is where the chi square, minimised over the other parameters, has risen by z² (times the misfit's variance
+    where the data's standard deviations are not known). Unlike a standard error it is right where the model bends and
+    where a bound is near.
+
+    Parameters
+    ----------
+    residuals : callable
+        Those of the fit.
+    found : Fit
+    z : float
+        1.96 of an interval of 95 %.
+    """
+    scale = 1.0 if found.known_sigma or found.n_free < 1 else found.chi_square / found.n_free
+    rise = z**2 * scale
+    errors = found.inner_errors()
+    return {
+        parameter.name: (
+            _end(residuals, found, parameter, -1.0, rise, errors),
+            _end(residuals, found, parameter, 1.0, rise, errors),
+        )
+        for parameter in found.moved
+    }
+
+
+def _end(
+    residuals: Residuals,
+    found: Fit,
+    parameter: FreeParameter,
+    direction: float,
+    rise: float,
+    errors: dict[str, float] | None,
+) -> float | None:
+    from scipy.optimize import brentq
+
+    best = parameter.inner(found.values[parameter.name])
+    limit = parameter.inner(parameter.low if direction < 0.0 else parameter.high)
+    error = None if errors is None else errors[parameter.name]
+    step = error * math.sqrt(rise) if error else 0.1 * max(abs(best), 1.0)
+
+    def above(place: float) -> float:
+        """Zero at the end of the interval, and close to a straight line towards it."""
+        risen = _profile(residuals, found, parameter, place) - found.chi_square
+        return math.sqrt(max(risen, 0.0)) - math.sqrt(rise)
+
+    inside, outside = best, best + direction * step
+    for _ in range(_STEPS):
+        outside = min(outside, limit) if direction > 0.0 else max(outside, limit)
+        if above(outside) >= 0.0:
+            end = brentq(above, inside, outside, xtol=_CLOSE * abs(outside - best), maxiter=_STEPS)
+            return parameter.outer(float(end))
+        if outside == limit or not math.isfinite(outside):
+            return None
+        inside, outside = outside, best + 1.6 * (outside - best)
+    return None
+
+
+def _profile(residuals: Residuals, found: Fit, held: FreeParameter, place: float) -> float:
+    """Chi square minimised over all parameters but one, with its prior's part for the place it is held at."""
+    value = held.outer(place)
+    others = [
+        FreeParameter(p.name, _within(p, found.values[p.name]), p.low, p.high, p.prior, p.scale, p.expression)
+        for p in found.parameters
+        if p.name != held.name
+    ]
+    of_prior = 0.0 if held.prior is None else ((place - held.prior[0]) / held.prior[1]) ** 2
+    again = fit(lambda values: residuals({**values, held.name: value}), others, known_sigma=found.known_sigma)
+    return again.chi_square + of_prior
+
+
+def _within(parameter: FreeParameter, value: float) -> float:
+    return min(max(value, parameter.low), parameter.high)

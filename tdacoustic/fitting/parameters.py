@@ -1,0 +1,136 @@
+"""Parameters that a fit may move, and how lmfit knows them."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from tdacoustic.errors import FittingError
+
+if TYPE_CHECKING:
+    import lmfit
+
+__all__ = ["FreeParameter", "lmfit_parameters", "values_of"]
+
+
+@dataclass(frozen=True)
+class FreeParameter:
+    """A parameter that a fit may move.
+
+    Parameters
+    ----------
+    name : str
+        As a fleet's dotted key, ``"masuda.constant_db"``.
+    initial : float
+    low, high : float
+        Bounds; infinite where there are none.
+    prior : (float, float), optional
+        Mean and standard deviation of what is known before; in the unit of the value, or in its natural logarithm
+        where the scale is "log".
+    scale : {"linear", "log"}
+        On which the parameter is moved and its interval is symmetric.
+    expression : str, optional
+        Instead of moving it: lmfit's expression of other parameters, by their names.
+
+    Raises
+    ------
+    FittingError
+        Bounds that do not hold the initial value, a prior without width, or a logarithm of what is not above zero.
+    """
+
+    name: str
+    initial: float
+    low: float = -math.inf
+    high: float = math.inf
+    prior: tuple[float, float] | None = None
+    scale: Literal["linear", "log"] = "linear"
+    expression: str | None = None
+
+    def __post_init__(self) -> None:
+        if not math.isfinite(self.initial):
+            raise FittingError(f"{self.name}: the initial value must be a number, got {self.initial!r}")
+        if not self.low < self.high:
+            raise FittingError(f"{self.name}: bounds must be ascending, got {self.low:g} and {self.high:g}")
+        if not self.low <= self.initial <= self.high:
+            raise FittingError(
+                f"{self.name}: the initial value {self.initial:g} is outside of its bounds, {self.low:g} to "
+                f"{self.high:g}"
+            )
+        if self.prior is not None and not self.prior[1] > 0.0:
+            raise FittingError(f"{self.name}: the prior's standard deviation must be > 0, got {self.prior[1]:g}")
+        if self.scale == "log" and not (self.initial > 0.0 and self.low >= 0.0):
+            raise FittingError(
+                f'{self.name}: scale = "log" needs values above 0, got {self.initial:g} from {self.low:g}'
+            )
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether the fit moves it, rather than an expression."""
+        return self.expression is None
+
+    def inner(self, value: float) -> float:
+        """Value on the scale of the fit."""
+        if self.scale == "linear":
+            return value
+        return math.log(value) if value > 0.0 else -math.inf
+
+    def outer(self, inner: float) -> float:
+        """Value for its place on the scale of the fit."""
+        return inner if self.scale == "linear" else math.exp(inner)
+
+
+def _symbol(name: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_]", "__", name)
+
+
+def _expression(parameter: FreeParameter, known: Sequence[FreeParameter]) -> str:
+    """The expression in lmfit's symbols, of parameters in their own units."""
+    text = str(parameter.expression)
+    for other in sorted(known, key=lambda item: -len(item.name)):
+        value = _symbol(other.name) if other.scale == "linear" else f"exp({_symbol(other.name)})"
+        text = re.sub(rf"(?<![\w.]){re.escape(other.name)}(?![\w.])", value, text)
+    return f"log({text})" if parameter.scale == "log" else text
+
+
+def lmfit_parameters(parameters: Sequence[FreeParameter], inner: Mapping[str, float] | None = None) -> lmfit.Parameters:
+    """Return lmfit's parameters, on the scale of the fit.
+
+    Parameters
+    ----------
+    parameters : sequence of FreeParameter
+    inner : mapping of str to float, optional
+        Where to start, by name and on the scale of the fit. Default: the initial values.
+
+    Raises
+    ------
+    FittingError
+        Two of one name, or an expression that lmfit does not understand.
+    """
+    import lmfit
+
+    names = [parameter.name for parameter in parameters]
+    twice = next((name for index, name in enumerate(names) if name in names[:index]), None)
+    if twice is not None:
+        raise FittingError(f"parameter {twice!r} is freed twice")
+    made: Any = lmfit.Parameters()
+    for parameter in parameters:
+        value = (inner or {}).get(parameter.name, parameter.inner(parameter.initial))
+        made.add(
+            _symbol(parameter.name), value, min=parameter.inner(parameter.low), max=parameter.inner(parameter.high)
+        )
+    for parameter in parameters:
+        if parameter.expression is not None:
+            try:
+                made[_symbol(parameter.name)].expr = _expression(parameter, parameters)
+                float(made[_symbol(parameter.name)].value)
+            except Exception as error:  # asteval raises whatever the expression raises
+                raise FittingError(f"{parameter.name}: expression {parameter.expression!r}: {error}") from error
+    return made
+
+
+def values_of(parameters: Sequence[FreeParameter], found: lmfit.Parameters) -> dict[str, float]:
+    """Return the values of lmfit's parameters in their own units, by name."""
+    return {parameter.name: parameter.outer(float(found[_symbol(parameter.name)].value)) for parameter in parameters}
