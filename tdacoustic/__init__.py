@@ -22,6 +22,7 @@ _PUBLIC = {
     "DriveModel": "tdacoustic.drive",
     "TdacousticError": "tdacoustic.errors",
     "analyze": "tdacoustic.workflows.analyze",
+    "calibrate": "tdacoustic.workflows.calibrate",
     "find_families": "tdacoustic.lines",
     "find_lines": "tdacoustic.lines",
     "load_campaign": "tdacoustic.campaign",

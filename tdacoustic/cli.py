@@ -218,6 +218,33 @@ def predict(
 
 
 @app.command()
+def calibrate(
+    campaign: Campaign,
+    out: Out = None,
+    overwrite: Overwrite = False,
+    store: StorePath = None,
+    jobs: Jobs = None,
+    quiet: Quiet = False,
+) -> None:
+    """Fit the model of a campaign's fleet to its measured levels."""
+    from tdacoustic.campaign import load_campaign
+    from tdacoustic.workflows.calibrate import calibrate as compute
+    from tdacoustic.workflows.output import OutputFolder, default_output
+    from tdacoustic.workflows.write import write_calibration
+
+    loaded = load_campaign(campaign)  # a wrong campaign is said before anything else
+    target = out or default_output(_toml(campaign))
+    folder = OutputFolder(target, _toml(campaign), overwrite)
+    with _progress(quiet) as progress:
+        result = compute(loaded, store, jobs, progress)
+    write_calibration(result, folder)
+    for doubt in result.calibration.doubts:
+        _say(f"warning: {doubt}")
+    if not quiet:
+        print(target / "report.html")
+
+
+@app.command()
 def run(
     campaign: Campaign,
     out: Out = None,

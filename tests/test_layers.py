@@ -31,13 +31,13 @@ ALLOWED = {
     "fitting": "drive radiation motor gears fleet steps units errors",
     "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
     "attribution": "measured quality lines spectra speed campaign fleet steps units errors",
-    "results": "drive attribution measured campaign fleet spectra steps errors",
+    "results": "fitting drive attribution measured campaign fleet spectra steps errors",
     "tables": "drive gears attribution measured campaign fleet units errors",
-    "reporting": "results tables drive gears attribution measured campaign fleet quality lines spectra speed recording "
-    "units errors __version__",
+    "reporting": "results tables fitting drive gears attribution measured campaign fleet quality lines spectra speed "
+    "recording units errors __version__",
     "synthesis": "errors",
-    "workflows": "reporting tables results drive gears attribution measured steps quality lines spectra speed ingest "
-    "campaign fleet toml_models formats recording units errors",
+    "workflows": "reporting tables results fitting drive gears attribution measured steps quality lines spectra speed "
+    "ingest campaign fleet toml_models formats recording units errors",
     "cli": "workflows synthesis results campaign fleet errors __version__",
     "__main__": "cli",
     "__init__": "",

@@ -20,7 +20,7 @@ from tdacoustic.fleet import Fleet
 
 __all__ = ["Calibration", "FittedLevel", "FittedParameter", "LeftOut", "calibrate_fleet", "free_parameter"]
 
-STARTS: Final = 6
+STARTS: Final = 16
 CORRELATED: Final = 0.95
 OUTLYING: Final = 2.5
 """Residual over its standard deviation from which a condition is called outlying [assumed]."""
@@ -251,7 +251,7 @@ def _left_out(model: LevelModel, condition: str, found: Fit, model_sigma_db: flo
     if not others.data:
         return LeftOut(condition, None)
     started = [_from(parameter, found.values[parameter.name]) for parameter in found.parameters]
-    again = fit(_residuals(others, model_sigma_db), started)
+    again = fit(_residuals(others, model_sigma_db), started, polish=False)
     predicted = model.levels_db(again.values)
     errors = [
         float(level) - datum.level_db
@@ -327,4 +327,5 @@ def _doubts_of_values(found: Fit, parameters: tuple[FittedParameter, ...]) -> It
                     )
     near = [chi for chi, _ in found.minima if chi < found.chi_square + 4.0]
     if near:
-        yield f"there is more than one minimum: {len(near)} other sets of values fit about as well"
+        others = "another set of values fits" if len(near) == 1 else f"{len(near)} other sets of values fit"
+        yield f"there is more than one minimum: {others} about as well"

@@ -86,7 +86,9 @@ def _profile(residuals: Residuals, found: Fit, held: FreeParameter, place: float
         if p.name != held.name
     ]
     of_prior = 0.0 if held.prior is None else ((place - held.prior[0]) / held.prior[1]) ** 2
-    again = fit(lambda values: residuals({**values, held.name: value}), others, known_sigma=found.known_sigma)
+    again = fit(
+        lambda values: residuals({**values, held.name: value}), others, known_sigma=found.known_sigma, polish=False
+    )
     return again.chi_square + of_prior
 
 

@@ -30,6 +30,9 @@ SAME_MINIMUM: Final = 0.05
 RANK: Final = 1e-10
 """Singular value of the Jacobian, its columns of length one, over the largest, below which a direction is not seen."""
 
+REFINED: Final = 4
+"""Starts from which the search goes on."""
+
 _NO_NUMBER: Final = 1e50
 _POLISHING: Final = 10
 
@@ -139,6 +142,7 @@ def fit(
     loss: Loss = "linear",
     known_sigma: bool = True,
     seed: int = 0,
+    polish: bool = True,
 ) -> Fit:
     """Minimise the sum of squared weighted residuals.
 
@@ -148,13 +152,16 @@ def fit(
         From values by name to residuals over their standard deviations.
     parameters : sequence of FreeParameter
     starts : int
-        The initial values, and starts spread over the bounds; parameters without bounds start where they are.
+        The initial values, and starts spread over the bounds, of which the search goes on from the best `REFINED`;
+        parameters without bounds start where they are.
     loss : str
         ``"linear"``, or one of scipy's robust losses.
     known_sigma : bool
         Whether the residuals' standard deviations are known; else errors are scaled with the misfit.
     seed : int
         Of the spread of starts.
+    polish : bool
+        Whether the last digits are wanted.
 
     Raises
     ------
@@ -164,7 +171,8 @@ def fit(
     held = tuple(parameters)
     weighted = _with_priors(residuals, held)
     n_data = _checked(residuals, held)
-    optima = [_minimised(weighted, held, start, loss) for start in _starts(held, starts, seed)]
+    begun = _best(weighted, held, _starts(held, starts, seed))
+    optima = [_minimised(weighted, held, start, loss, polish) for start in begun]
     optima = sorted((found for found in optima if math.isfinite(found[0])), key=lambda found: found[0])
     if not optima:
         raise FittingError("no start of the fit ended in an optimum")
@@ -212,8 +220,22 @@ def _starts(parameters: tuple[FreeParameter, ...], n_starts: int, seed: int) -> 
     return found
 
 
+def _best(
+    weighted: Residuals, parameters: tuple[FreeParameter, ...], starts: list[dict[str, float]]
+) -> list[dict[str, float]]:
+    """Return the initial values and the best of the other starts."""
+    if len(starts) <= REFINED:
+        return starts
+    first, *others = starts
+
+    def misfit(start: dict[str, float]) -> float:
+        return float((_finite(weighted(values_of(parameters, lmfit_parameters(parameters, start)))) ** 2).sum())
+
+    return [first, *sorted(others, key=misfit)[: REFINED - 1]]
+
+
 def _minimised(
-    weighted: Residuals, parameters: tuple[FreeParameter, ...], start: dict[str, float], loss: Loss
+    weighted: Residuals, parameters: tuple[FreeParameter, ...], start: dict[str, float], loss: Loss, polish: bool
 ) -> tuple[float, dict[str, float]]:
     """Return chi square and values of the optimum that a start ends in.
 
@@ -229,15 +251,15 @@ def _minimised(
     if not any(parameter.is_moved for parameter in parameters):
         return float((residual(made) ** 2).sum()), values_of(parameters, made)
     close = 1e-8 if _has_bounds(parameters) else 1e-12  # what is bounded is costly, and polished afterwards
-    options: dict[str, Any] = {"xtol": close, "ftol": close, "gtol": close}
+    options: dict[str, Any] = {"xtol": close, "ftol": close, "gtol": close, "calc_covar": False}
     ends = [lmfit.minimize(residual, made, method="least_squares", loss=loss, x_scale="jac", **options)]
     moved = sum(parameter.is_moved for parameter in parameters)
     if loss == "linear" and residual(made).size >= moved and not _has_bounds(parameters):
-        ends.append(lmfit.minimize(residual, made, method="leastsq", xtol=1e-14, ftol=1e-14))
+        ends.append(lmfit.minimize(residual, made, method="leastsq", xtol=1e-14, ftol=1e-14, calc_covar=False))
     found = [values_of(parameters, end.params) for end in ends]
     optima = [(float((_finite(weighted(values)) ** 2).sum()), values) for values in found]
     best = min(optima, key=lambda optimum: optimum[0])
-    return _polished(weighted, parameters, best) if loss == "linear" else best
+    return _polished(weighted, parameters, best) if loss == "linear" and polish else best
 
 
 def _finite(residuals: Real) -> Real:

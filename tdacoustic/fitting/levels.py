@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver
 from tdacoustic.errors import FittingError
 from tdacoustic.fleet import Fleet
-from tdacoustic.gears import SteadyState
 
 __all__ = ["SILENCE_DB", "LevelModel", "MeasuredLevel"]
 
@@ -21,6 +20,9 @@ DYNAMIC = ("train.", "gear_pair.", "gear_dynamics.", "operation.", "model.gear_p
 """Parameters that change the motion of the gears; of others only the sound is computed anew."""
 
 SILENCE_DB = -200.0
+
+Motion: TypeAlias = tuple[float, float]
+"""Peak-to-peak transmission error and static compression in m: all that the meshing noise depends on."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,7 @@ class LevelModel:
             name: tuple({d.receiver.name: d.receiver for d in data if d.condition.name == name}.values())
             for name in (condition.name for condition in self.conditions)
         }
-        self._motions: dict[tuple[tuple[str, float], ...], tuple[GearUnit, tuple[SteadyState, ...]]] = {}
+        self._motions: dict[tuple[tuple[str, float], ...], tuple[GearUnit, tuple[Motion, ...]]] = {}
 
     def sounds(self, values: Mapping[str, float]) -> tuple[DriveSound, ...]:
         """Return the drive's sound in each condition, with all contributions, for values of parameters by key."""
@@ -85,8 +87,8 @@ class LevelModel:
         unit, motions = self._motion(fleet, values)
         model = DriveModel(fleet, unit)
         return tuple(
-            model.sound(model.gears(condition, steady=steady), self._receivers[condition.name])
-            for condition, steady in zip(self.conditions, motions, strict=True)
+            model.sound(condition, model.masuda_db(condition, *motion), self._receivers[condition.name])
+            for condition, motion in zip(self.conditions, motions, strict=True)
         )
 
     def levels_db(self, values: Mapping[str, float]) -> NDArray[np.float64]:
@@ -95,12 +97,13 @@ class LevelModel:
         found = [sounds[d.condition.name].level_db(d.receiver.name, "total", d.weighting) for d in self.data]
         return np.array([SILENCE_DB if level is None else level for level in found])
 
-    def _motion(self, fleet: Fleet, values: Mapping[str, float]) -> tuple[GearUnit, tuple[SteadyState, ...]]:
+    def _motion(self, fleet: Fleet, values: Mapping[str, float]) -> tuple[GearUnit, tuple[Motion, ...]]:
         key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(DYNAMIC)))
         if key not in self._motions:
             model = DriveModel(fleet)
-            states = tuple(model.gears(condition).steady for condition in self.conditions)
-            self._motions[key] = (model.unit, states)
+            states = [model.motion(condition) for condition in self.conditions]
+            motions = tuple((state.dte_pp_m, state.static_compression_m) for state in states)
+            self._motions[key] = (model.unit, motions)
         return self._motions[key]
 
     def without(self, condition: str) -> LevelModel:

@@ -1,6 +1,7 @@
 """What the commands found, as reports, files and notebooks read it."""
 
 from tdacoustic.results.analysis import Analysis, LogInput
+from tdacoustic.results.campaign_calibration import CampaignCalibration
 from tdacoustic.results.fleet_prediction import FleetPrediction
 
-__all__ = ["Analysis", "FleetPrediction", "LogInput"]
+__all__ = ["Analysis", "CampaignCalibration", "FleetPrediction", "LogInput"]

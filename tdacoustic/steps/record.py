@@ -9,7 +9,7 @@ from importlib import metadata
 
 __all__ = ["Record", "versions"]
 
-_RECORDED = ("tdacoustic", "numpy", "scipy", "pandas", "h5py", "soundfile", "pyuff", "PyOctaveBand", "numba")
+_RECORDED = ("tdacoustic", "numpy", "scipy", "pandas", "h5py", "soundfile", "pyuff", "PyOctaveBand", "numba", "lmfit")
 
 
 @dataclass(frozen=True)

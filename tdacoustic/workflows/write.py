@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 from tdacoustic.workflows.output import OutputFolder
 
 if TYPE_CHECKING:
-    from tdacoustic.results import Analysis, FleetPrediction
+    from tdacoustic.results import Analysis, CampaignCalibration, FleetPrediction
 
-__all__ = ["write_analysis", "write_check", "write_prediction"]
+__all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction"]
 
 
 def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> None:
@@ -94,4 +94,36 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
             "steps": sorted({f"{record.step}/{record.version}" for _, record in result.records}),
             "versions": result.versions,
             "problems": list(result.prediction.doubts),
+        }
+
+
+def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None:
+    """Write ``calibration.json``, ``fleet.calibrated.toml``, ``result.h5`` and ``report.html`` into an output folder.
+
+    Parameters
+    ----------
+    result : CampaignCalibration
+    folder : OutputFolder
+        Not entered yet.
+    """
+    from tdacoustic.fleet import fleet_toml
+    from tdacoustic.reporting.calibration_report import calibration_report
+    from tdacoustic.reporting.html import render_html
+    from tdacoustic.tables.result_file import write_result_file
+    from tdacoustic.workflows.calibrate import calibration_json
+
+    campaign, found = result.campaign, result.calibration
+    with folder:
+        folder.write_text("calibration.json", calibration_json(result))
+        folder.write_text("fleet.calibrated.toml", fleet_toml(found.fleet))
+        runs = () if result.analysis is None else result.analysis.runs
+        write_result_file(folder.staging / "result.h5", campaign.name, campaign.origin, runs)
+        folder.write_text("report.html", render_html(calibration_report(result)))
+        folder.manifest = {
+            "command": "calibrate",
+            "campaign": {"name": campaign.name, "origin": campaign.origin},
+            "fleet": {"name": result.fleet.name},
+            "inputs": [{"file": name, "sha256": sha256} for name, sha256 in result.inputs],
+            "versions": result.versions,
+            "problems": list(found.doubts),
         }

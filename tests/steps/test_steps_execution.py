@@ -107,11 +107,13 @@ def test_the_lineage_of_a_result(store, tmp_path):
 
 
 POOL = """
+import signal
 import sys
 sys.path.insert(0, {here!r})
 from sample_steps import SLOW
 from tdacoustic.steps import Store, execute
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job is started deaf to it
     execute([SLOW.task(str(i), ({pids!r}, 60.0 + i)) for i in range(4)], Store({store!r}), 2)
 """
 

@@ -1,0 +1,106 @@
+"""What the reader of a prediction must know before using its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tdacoustic.drive.gear_unit import GearUnit
+from tdacoustic.drive.prediction import DriveSound, GearState, HelixCase
+from tdacoustic.fleet import Fleet
+from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
+
+__all__ = ["gear_doubts", "sound_doubts"]
+
+
+def gear_doubts(
+    fleet: Fleet, unit: GearUnit, states: tuple[GearState, ...], helix: tuple[HelixCase, ...]
+) -> Iterator[str]:
+    """Yield what the reader must know of the gears before using the numbers."""
+    yield from _stiffness_doubts(unit, helix)
+    yield from _mode_doubts(fleet, states)
+    loads = [unit.line_load_n_per_m(state.condition.torque_n_m) for state in states]
+    low = [pair for pair in zip(states, loads, strict=True) if 0.0 < pair[1] < LOW_LOAD_N_PER_M]
+    if low:
+        least = min(load for _, load in low)
+        yield (
+            f"{_conditions([state for state, _ in low])}: the load on the teeth is below 100 N/mm (down to "
+            f"{1e-3 * least:.3g} N/mm), where ISO 6336-1 lowers the mesh stiffness in proportion; here it is not "
+            "lowered"
+        )
+    by_text: dict[str, list[GearState]] = {}
+    for state in (*states, *(case.gears for case in helix)):
+        doubt = _doubt_of(state)
+        if doubt is not None:
+            by_text.setdefault(doubt, []).append(state)
+    yield from (f"{_conditions(held)}: {doubt}" for doubt, held in by_text.items())
+
+
+def _mode_doubts(fleet: Fleet, states: tuple[GearState, ...]) -> Iterator[str]:
+    operation = fleet.operation
+    mode, law = operation.mode.value, operation.torque.value.replace("_", " ")
+    if not any(state.condition.torque_n_m < 0.0 for state in states):
+        return
+    if mode == "traction":
+        yield "the mode is traction, but the torque is below zero: the wheelset drives the motor"
+    else:
+        yield (
+            f"the mode is {mode}: the wheelset drives, and the torque of the law ({law}) is taken as one against "
+            "the motor, on the other flanks of the teeth"
+        )
+
+
+def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str, ...]) -> Iterator[str]:
+    """Yield what the reader must know of the levels; `unknown` names the motor's excitations without amplitude."""
+    gear_path, placement = fleet.model.gear_path.value, fleet.masuda.placement.value
+    if fleet.radiation.method.value != "point_sources":
+        yield "boundary elements are not there yet: the field is that of point sources"
+    if gear_path != "masuda":
+        yield (
+            f'gear_path = "{gear_path}": the bearing forces\' way through the housing is not there yet, so the '
+            "total lacks it"
+        )
+    if placement == "inside" and gear_path != "structure":
+        yield (
+            "Masuda's source is put inside the housing, whose insertion loss is not there yet: the total holds "
+            "nothing of it, and its constant cannot be seen in a level outside"
+        )
+    if placement == "off":
+        yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
+    if unknown:
+        yield (
+            f"excitation{'s' if len(unknown) > 1 else ''} {', '.join(unknown)} of the motor: neither flux "
+            "densities nor a sound power level, so no sound of theirs is in the levels"
+        )
+    if not any(s.path == "motor" for one in sound for s in one.sources):
+        yield "the motor makes no sound in this model: the levels are those of the gears alone"
+
+
+def _stiffness_doubts(unit: GearUnit, helix: tuple[HelixCase, ...]) -> Iterator[str]:
+    yield from (f"mesh stiffness: {doubt}" for doubt in unit.stiffness.doubts)
+    for case in helix:
+        beyond = [doubt for doubt in case.unit.stiffness.doubts if not doubt.startswith("transverse contact ratio")]
+        yield from (f"mesh stiffness at {case.helix_angle_deg:g}°: {doubt}" for doubt in beyond)
+
+
+def _conditions(states: list[GearState]) -> str:
+    names = ", ".join(state.condition.name.replace(", ", " at ") for state in states)
+    return f"condition{'s' if len(states) > 1 else ''} {names}"
+
+
+def _doubt_of(state: GearState) -> str | None:
+    steady = state.steady
+    if steady.method == "at_rest":
+        return (
+            "without torque the teeth of the model do not touch, so there is no force and no meshing noise; real gears "
+            "rattle under what the model leaves out"
+        )
+    if steady.repeats_after is None:
+        return (
+            "the motion does not repeat: forces are the strongest lines of a record of it, the peak to peak is that of "
+            "the record, and what is broadband has no line"
+        )
+    if steady.repeats_after > 1:
+        return (
+            f"the motion repeats only after {steady.repeats_after} mesh periods, with lines between the mesh harmonics"
+        )
+    return None

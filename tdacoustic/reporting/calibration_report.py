@@ -1,0 +1,43 @@
+"""The report of a calibration."""
+
+from __future__ import annotations
+
+from tdacoustic import __version__
+from tdacoustic.reporting.document import Column, Document, Facts, Notice, Section, Table
+from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
+from tdacoustic.results import CampaignCalibration
+
+__all__ = ["calibration_report"]
+
+
+def calibration_report(result: CampaignCalibration) -> Document:
+    """Return the report on a calibration.
+
+    Parameters
+    ----------
+    result : CampaignCalibration
+    """
+    campaign = result.campaign
+    notices = []
+    if campaign.origin == "synthetic":
+        text = "The levels come from signals made by a program. Nothing in this report was measured."
+        notices.append(Notice("synthetic", text))
+    columns = (Column("file", "File"), Column("sha256", "SHA-256"))
+    provenance = Section(
+        "provenance",
+        "How the numbers came about",
+        [
+            Table("inputs", "Inputs", columns, [list(pair) for pair in result.inputs]),
+            Section("versions", "Versions", [Facts(list(result.versions.items()))]),
+        ],
+    )
+    return Document(
+        title=campaign.name,
+        subtitle=f"The model of {result.fleet.name}, calibrated to the campaign's levels",
+        origin=campaign.origin,
+        summary=calibration_answer(result),
+        notices=notices,
+        sections=[calibration_section(result), provenance],
+        facts=[("Conditions", ", ".join(campaign.conditions())), ("Fleet", result.fleet.name)],
+        footer=[f"Made with tdacoustic {__version__}.", "Levels re 20 µPa."],
+    )

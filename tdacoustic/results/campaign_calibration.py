@@ -1,0 +1,41 @@
+"""A fleet calibrated to a campaign."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tdacoustic.campaign import Campaign
+from tdacoustic.fitting.calibration import Calibration
+from tdacoustic.fleet import Fleet
+from tdacoustic.results.analysis import Analysis
+from tdacoustic.steps.record import versions
+
+__all__ = ["CampaignCalibration"]
+
+
+@dataclass(frozen=True)
+class CampaignCalibration:
+    """A fleet calibrated to a campaign.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    fleet : Fleet
+        As it was; `calibration.fleet` is the calibrated one.
+    analysis : Analysis or None
+        The measured side; None of a campaign without runs.
+    calibration : Calibration
+    inputs : tuple of (str, str)
+        Name and sha256 of every file that went in.
+    """
+
+    campaign: Campaign
+    fleet: Fleet
+    analysis: Analysis | None
+    calibration: Calibration
+    inputs: tuple[tuple[str, str], ...]
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of Python and the libraries that made the numbers."""
+        return dict(versions())
