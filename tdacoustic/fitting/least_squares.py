@@ -252,7 +252,8 @@ def _minimised(
         return float((residual(made) ** 2).sum()), values_of(parameters, made)
     close = 1e-8 if _has_bounds(parameters) else 1e-12  # what is bounded is costly, and polished afterwards
     options: dict[str, Any] = {"xtol": close, "ftol": close, "gtol": close, "calc_covar": False}
-    ends = [lmfit.minimize(residual, made, method="least_squares", loss=loss, x_scale="jac", **options)]
+    with np.errstate(invalid="ignore", divide="ignore"):  # of a singular covariance, which is not lmfit's to judge
+        ends = [lmfit.minimize(residual, made, method="least_squares", loss=loss, x_scale="jac", **options)]
     moved = sum(parameter.is_moved for parameter in parameters)
     if loss == "linear" and residual(made).size >= moved and not _has_bounds(parameters):
         ends.append(lmfit.minimize(residual, made, method="leastsq", xtol=1e-14, ftol=1e-14, calc_covar=False))
