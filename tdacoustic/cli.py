@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -84,8 +84,8 @@ def _toml(campaign: Path) -> Path:
     return campaign / "campaign.toml" if campaign.is_dir() else campaign
 
 
-def _report_problems(analysis: Analysis) -> None:
-    for problem in analysis.problems:
+def _warn(problems: Iterable[str]) -> None:
+    for problem in problems:
         _say(f"warning: {problem}")
 
 
@@ -101,7 +101,7 @@ def _measure(
     folder = OutputFolder(target, _toml(campaign), overwrite)
     analysis = _analysed(loaded, store, jobs, quiet)
     write_analysis(analysis, folder, command)
-    _report_problems(analysis)
+    _warn(analysis.problems)
     return analysis, target
 
 
@@ -168,7 +168,7 @@ def check(
             )
         counts = table["verdict"].value_counts()
         print(", ".join(f"{counts.get(word, 0)} {word}" for word in ("ok", "warning", "bad")))
-    _report_problems(analysis)
+    _warn(analysis.problems)
     unusable = unusable_runs(analysis)
     if unusable:
         raise TdacousticError("\n".join(unusable))
@@ -211,8 +211,7 @@ def predict(
     with _progress(quiet) as progress:
         result = compute(loaded, store, progress)
     write_prediction(result, folder)
-    for doubt in result.prediction.doubts:
-        _say(f"warning: {doubt}")
+    _warn(result.prediction.doubts)
     if not quiet:
         print(target / "report.html")
 
@@ -238,8 +237,7 @@ def calibrate(
     with _progress(quiet) as progress:
         result = compute(loaded, store, jobs, progress)
     write_calibration(result, folder)
-    for doubt in result.calibration.doubts:
-        _say(f"warning: {doubt}")
+    _warn(result.calibration.doubts)
     if not quiet:
         print(target / "report.html")
 
@@ -279,8 +277,7 @@ def synthesize(
     with _progress(quiet) as progress:
         hear: Any = None if progress is None else (lambda name: progress(f"run {name}", 0, 1))
         result = make(recipe, out or recipe.parent, seed, overwrite=overwrite, on_run=hear)
-    for doubt in result.doubts:
-        _say(f"warning: {doubt}")
+    _warn(result.doubts)
     if not quiet:
         print(result.campaign)
 

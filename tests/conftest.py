@@ -84,6 +84,22 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+@pytest.fixture
+def call_program(capsys: pytest.CaptureFixture[str]) -> Callable[..., tuple[int, str, str]]:
+    """Run the program in this process: ``call_program(*arguments)`` returns exit code, stdout, stderr."""
+
+    def call(*arguments: object) -> tuple[int, str, str]:
+        from tdacoustic.cli import main
+
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as ended:
+            main([str(argument) for argument in arguments])
+        said = capsys.readouterr()
+        return int(ended.value.code or 0), said.out, said.err
+
+    return call
+
+
 @pytest.fixture(scope="session")
 def real_recordings() -> Path:
     """Folder of the real recordings beside the checkout; the test is skipped where it is absent."""

@@ -34,8 +34,6 @@ from small_campaigns import (  # noqa: E402
     write_log,
 )
 
-from tdacoustic.cli import main  # noqa: E402
-
 pytestmark = pytest.mark.filterwarnings("error::RuntimeWarning")  # a warning of numpy's would be a second message
 
 CHECKER = ROOT.parent / "shared" / "check_outputs.py"
@@ -48,7 +46,7 @@ def shared_store(tmp_path_factory):
 
 
 @pytest.fixture
-def tda(tmp_path, shared_store, capsys, monkeypatch):
+def tda(tmp_path, shared_store, call_program, monkeypatch):
     """Run the program in this process, in a folder of its own; returns exit code, stdout, stderr."""
     import tdacoustic.reporting.html as html
 
@@ -59,11 +57,7 @@ def tda(tmp_path, shared_store, capsys, monkeypatch):
     def call(*arguments, report=False):
         page = real if report else lambda document: "<!doctype html><title>stand-in</title>"
         monkeypatch.setattr(html, "render_html", page)
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
+        return call_program(*arguments)
 
     return call
 

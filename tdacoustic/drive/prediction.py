@@ -140,7 +140,7 @@ class Prediction:
     directivity : tuple of Directivity
         Of each condition and helix angle.
     helix : tuple of HelixCase
-        At the fastest condition; empty where the fleet names no angles.
+        At the fastest condition; the fleet's own angle where it names none.
     sweep : SpeedSweep or None
     doubts : tuple of str
         What the reader must know before using the numbers.

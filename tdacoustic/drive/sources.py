@@ -9,6 +9,7 @@ from typing import Literal
 from tdacoustic.drive.conditions import Condition
 from tdacoustic.errors import FleetError, MotorError
 from tdacoustic.fleet import Fleet, Kinematics, MotorExcitation
+from tdacoustic.fleet.excitations import motor_excitations
 from tdacoustic.gears.masuda import SPHERE_OF_1_M_DB
 from tdacoustic.motor import MotorFrame, Ring
 from tdacoustic.radiation import Air
@@ -92,29 +93,29 @@ class MotorSources:
             An excitation cannot be computed.
         """
         found = []
+        frequencies_hz = self._frequencies_hz(condition.motor_hz)
         for excitation in self._excitations:
-            frequency_hz = self._frequency_hz(excitation, condition.motor_hz)
-            if frequency_hz is None or frequency_hz <= 0.0:
+            frequency_hz = frequencies_hz.get(excitation.name, 0.0)
+            if frequency_hz <= 0.0:
                 continue
             level_db = self._level_db(excitation, frequency_hz, 60.0 * condition.motor_hz)
             if level_db is not None:
                 found.append(SoundSource("motor", excitation.name, frequency_hz, level_db, self._position_m))
         return tuple(found)
 
-    def _frequency_hz(self, excitation: MotorExcitation, motor_hz: float) -> float | None:
-        a, b, c, d = excitation.terms
-        carrier_hz, supply_hz = self._kinematics.carrier_hz(motor_hz), self._kinematics.supply_hz(motor_hz)
-        if (a and carrier_hz is None) or (b and supply_hz is None):
-            return None
-        return a * (carrier_hz or 0.0) + b * (supply_hz or 0.0) + c * motor_hz + d
+    def _frequencies_hz(self, motor_hz: float) -> dict[str, float]:
+        """Frequencies of the excitations that act at a motor speed, by name."""
+        motor, kinematics = self._fleet.motor, self._kinematics
+        if motor is None:
+            return {}
+        acting = motor_excitations(motor, motor_hz, kinematics.carrier_hz(motor_hz), kinematics.supply_hz(motor_hz))
+        return {excitation.name: excitation.frequency_hz for excitation in acting}
 
     def _level_db(self, excitation: MotorExcitation, frequency_hz: float, motor_speed_rpm: float) -> float | None:
         if excitation.flux_density_t is None:
             return excitation.sound_power_level_db_at(motor_speed_rpm)
         flux = excitation.flux_density_t_at(motor_speed_rpm)
-        if flux is None or min(flux) <= 0.0:
-            return None
-        assert self.frame is not None
+        assert self.frame is not None and flux is not None  # it acts at this speed
         where = f"{self._fleet.path}: [[motor.excitation]] {excitation.name}"
         if excitation.order is None:
             raise FleetError(f"{where}: order is missing, and its flux densities need it")

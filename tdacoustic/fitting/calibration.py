@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final, Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,7 +191,8 @@ def calibrate_fleet(
     if not data:
         raise FittingError("there are no levels to calibrate with")
     model = LevelModel(fleet, data)
-    silent = [d.condition.name for d, level in zip(data, model.levels_db({}), strict=True) if level <= SILENCE_DB]
+    before_db = model.levels_db({})
+    silent = [d.condition.name for d, level in zip(data, before_db, strict=True) if level <= SILENCE_DB]
     if silent:
         raise FittingError(
             f"{fleet.path}: the model gives no level in condition {', '.join(dict.fromkeys(silent))}: none of the "
@@ -202,7 +203,7 @@ def calibrate_fleet(
     intervals = profile_intervals(residuals, found) if found.covariance is not None else {}
     errors = found.standard_errors()
     parameters = tuple(_fitted(parameter, found, errors, intervals) for parameter in free)
-    before_db, after_db = model.levels_db({}), model.levels_db(found.values)
+    after_db = model.levels_db(found.values)
     levels = tuple(
         FittedLevel(datum, float(before), float(after), math.hypot(datum.sigma_db, model_sigma_db))
         for datum, before, after in zip(data, before_db, after_db, strict=True)
@@ -250,7 +251,7 @@ def _left_out(model: LevelModel, condition: str, found: Fit, model_sigma_db: flo
     others = model.without(condition)
     if not others.data:
         return LeftOut(condition, None)
-    started = [_from(parameter, found.values[parameter.name]) for parameter in found.parameters]
+    started = [parameter.starting_at(found.values[parameter.name]) for parameter in found.parameters]
     again = fit(_residuals(others, model_sigma_db), started, polish=False)
     predicted = model.levels_db(again.values)
     errors = [
@@ -259,13 +260,6 @@ def _left_out(model: LevelModel, condition: str, found: Fit, model_sigma_db: flo
         if datum.condition.name == condition
     ]
     return LeftOut(condition, sum(errors) / len(errors))
-
-
-def _from(parameter: FreeParameter, value: float) -> FreeParameter:
-    held: Any = parameter
-    return FreeParameter(
-        held.name, min(max(value, held.low), held.high), held.low, held.high, held.prior, held.scale, held.expression
-    )
 
 
 def _doubts(
@@ -283,8 +277,8 @@ def _doubts(
             f"{worst.error_db:+.1f} dB in condition {worst.datum.condition.name}"
         )
     scatter = np.array([level.error_db / level.sigma_db for level in levels])
-    for level, ratio in zip(levels, scatter, strict=True):
-        others = np.delete(scatter, np.argmax(scatter == ratio))
+    for index, (level, ratio) in enumerate(zip(levels, scatter, strict=True)):
+        others = np.delete(scatter, index)
         if abs(ratio) > OUTLYING and others.size and abs(ratio) > 3.0 * float(np.abs(others).mean()):
             yield (
                 f"condition {level.datum.condition.name} is outlying: the model is {level.error_db:+.1f} dB off there, "

@@ -80,17 +80,9 @@ def _end(
 def _profile(residuals: Residuals, found: Fit, held: FreeParameter, place: float) -> float:
     """Chi square minimised over all parameters but one, with its prior's part for the place it is held at."""
     value = held.outer(place)
-    others = [
-        FreeParameter(p.name, _within(p, found.values[p.name]), p.low, p.high, p.prior, p.scale, p.expression)
-        for p in found.parameters
-        if p.name != held.name
-    ]
+    others = [p.starting_at(found.values[p.name]) for p in found.parameters if p.name != held.name]
     of_prior = 0.0 if held.prior is None else ((place - held.prior[0]) / held.prior[1]) ** 2
     again = fit(
         lambda values: residuals({**values, held.name: value}), others, known_sigma=found.known_sigma, polish=False
     )
     return again.chi_square + of_prior
-
-
-def _within(parameter: FreeParameter, value: float) -> float:
-    return min(max(value, parameter.low), parameter.high)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 from tdacoustic.errors import FittingError
@@ -70,6 +70,10 @@ class FreeParameter:
     def is_moved(self) -> bool:
         """Whether the fit moves it, rather than an expression."""
         return self.expression is None
+
+    def starting_at(self, value: float) -> FreeParameter:
+        """Return the parameter with another initial value, brought into its bounds."""
+        return replace(self, initial=min(max(value, self.low), self.high))
 
     def inner(self, value: float) -> float:
         """Value on the scale of the fit."""

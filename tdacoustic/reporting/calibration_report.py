@@ -27,7 +27,7 @@ def calibration_report(result: CampaignCalibration) -> Document:
         "provenance",
         "How the numbers came about",
         [
-            Table("inputs", "Inputs", columns, [list(pair) for pair in result.inputs]),
+            Table("inputs", "Inputs", columns, [(file.written, file.sha256) for file in result.inputs]),
             Section("versions", "Versions", [Facts(list(result.versions.items()))]),
         ],
     )

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tdacoustic.campaign import Campaign
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.fleet import Fleet
-from tdacoustic.results.analysis import Analysis
+from tdacoustic.results.analysis import Analysis, LogInput
 from tdacoustic.steps.record import versions
 
 __all__ = ["CampaignCalibration"]
@@ -25,15 +25,15 @@ class CampaignCalibration:
     analysis : Analysis or None
         The measured side; None of a campaign without runs.
     calibration : Calibration
-    inputs : tuple of (str, str)
-        Name and sha256 of every file that went in.
+    inputs : tuple of LogInput
+        Every file that went in.
     """
 
     campaign: Campaign
     fleet: Fleet
     analysis: Analysis | None
     calibration: Calibration
-    inputs: tuple[tuple[str, str], ...]
+    inputs: tuple[LogInput, ...]
 
     @property
     def versions(self) -> dict[str, str]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from tdacoustic.drive import Prediction
 from tdacoustic.fleet import Fleet
+from tdacoustic.results.analysis import LogInput
 from tdacoustic.steps import Record
 from tdacoustic.steps.record import versions
 
@@ -27,8 +28,8 @@ class FleetPrediction:
     prediction : Prediction
     tables : mapping of str to DataFrame
         ``conditions``, ``predictions``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``.
-    sha256 : str
-        Of the fleet file.
+    inputs : tuple of LogInput
+        The fleet file.
     records : tuple of (str, Record)
         Key and record of every step.
 
@@ -40,7 +41,7 @@ class FleetPrediction:
     fleet: Fleet
     prediction: Prediction
     tables: Mapping[str, pd.DataFrame]
-    sha256: str
+    inputs: tuple[LogInput, ...]
     records: tuple[tuple[str, Record], ...]
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from dataclasses import replace
@@ -47,6 +46,7 @@ def calibrate(
     from tdacoustic.results import CampaignCalibration
     from tdacoustic.workflows.analyze import analyze
     from tdacoustic.workflows.measured_levels import measured_levels
+    from tdacoustic.workflows.runs import written_inputs
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
@@ -61,11 +61,8 @@ def calibrate(
     origin = f"calibrated to {campaign.name}"
     found = calibrate_fleet(fleet, data, free, campaign.calibration.model_sigma_db, origin)
     found = replace(found, doubts=(*doubts, *found.doubts))
-    files = [(campaign.path.name, campaign.path), (campaign.fleet.text, campaign.fleet.path)]
-    inputs = [(name, hashlib.sha256(path.read_bytes()).hexdigest()) for name, path in files]
-    if analysis is not None:
-        inputs += [(log.written, log.sha256) for log in analysis.inputs if log.written not in dict(inputs)]
-    return CampaignCalibration(campaign, fleet, analysis, found, tuple(inputs))
+    inputs = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
+    return CampaignCalibration(campaign, fleet, analysis, found, inputs)
 
 
 def calibration_json(result: CampaignCalibration) -> str:
@@ -112,7 +109,7 @@ def calibration_json(result: CampaignCalibration) -> str:
         "rank": found.rank,
         "chi_square": found.chi_square,
         "doubts": list(found.doubts),
-        "inputs": [{"file": name, "sha256": sha256} for name, sha256 in result.inputs],
+        "inputs": [{"file": file.written, "sha256": file.sha256} for file in result.inputs],
         "versions": result.versions,
     }
     return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"

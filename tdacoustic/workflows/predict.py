@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tdacoustic.errors import TdacousticError
 from tdacoustic.fleet import Fleet, load_fleet
-from tdacoustic.steps import Store, default_store_path
+from tdacoustic.steps import Store, default_store_path, log_file
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
@@ -43,7 +42,7 @@ def predict(
         The fleet is wrong, lacks a parameter, or its gears cannot be.
     """
     from tdacoustic.drive import DriveModel
-    from tdacoustic.results import FleetPrediction
+    from tdacoustic.results import FleetPrediction, LogInput
     from tdacoustic.tables import predicted_tables
 
     fleet = fleet if isinstance(fleet, Fleet) else load_fleet(fleet)
@@ -54,7 +53,9 @@ def predict(
     doubts = (*prediction.doubts, *_doubts_of_sweep(sweep))
     prediction = replace(prediction, sweep=sweep, doubts=doubts)
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)
-    return FleetPrediction(fleet, prediction, tables, hashlib.sha256(fleet.path.read_bytes()).hexdigest(), records)
+    file = log_file(fleet.path)
+    inputs = (LogInput(fleet.path.name, file.sha256, file.n_bytes, "TOML"),)
+    return FleetPrediction(fleet, prediction, tables, inputs, records)
 
 
 def _sweep(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tdacoustic.workflows.output import OutputFolder
 
 if TYPE_CHECKING:
-    from tdacoustic.results import Analysis, CampaignCalibration, FleetPrediction
+    from tdacoustic.results import Analysis, CampaignCalibration, FleetPrediction, LogInput
+    from tdacoustic.steps import Record
 
 __all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction"]
 
@@ -53,15 +55,22 @@ def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
     return {
         "command": command,
         "campaign": {"name": campaign.name, "origin": campaign.origin},
-        "inputs": [
-            {"file": log.written, "sha256": log.sha256, "bytes": log.n_bytes, "format": log.format}
-            for log in analysis.inputs
-        ],
+        "inputs": _inputs(analysis.inputs),
         "settings": {key: list(v) if isinstance(v, tuple) else v for key, v in analysis.settings.items()},
-        "steps": sorted({f"{record.step}/{record.version}" for _, record in analysis.records}),
+        "steps": _steps(analysis.records),
         "versions": analysis.versions,
         "problems": list(analysis.problems),
     }
+
+
+def _inputs(files: Sequence[LogInput]) -> list[dict[str, Any]]:
+    return [
+        {"file": file.written, "sha256": file.sha256, "bytes": file.n_bytes, "format": file.format} for file in files
+    ]
+
+
+def _steps(records: Sequence[tuple[str, Record]]) -> list[str]:
+    return sorted({f"{record.step}/{record.version}" for _, record in records})
 
 
 def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
@@ -88,10 +97,8 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
         folder.manifest = {
             "command": "predict",
             "fleet": {"name": fleet.name},
-            "inputs": [
-                {"file": fleet.path.name, "sha256": result.sha256, "bytes": fleet.path.stat().st_size, "format": "TOML"}
-            ],
-            "steps": sorted({f"{record.step}/{record.version}" for _, record in result.records}),
+            "inputs": _inputs(result.inputs),
+            "steps": _steps(result.records),
             "versions": result.versions,
             "problems": list(result.prediction.doubts),
         }
@@ -123,7 +130,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
             "command": "calibrate",
             "campaign": {"name": campaign.name, "origin": campaign.origin},
             "fleet": {"name": result.fleet.name},
-            "inputs": [{"file": name, "sha256": sha256} for name, sha256 in result.inputs],
+            "inputs": _inputs(result.inputs),
             "versions": result.versions,
             "problems": list(found.doubts),
         }

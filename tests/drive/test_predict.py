@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import tdacoustic as td
-from tdacoustic.cli import main
 from tdacoustic.steps import Store
 
 CHECKER = Path(__file__).resolve().parents[3] / "shared" / "check_outputs.py"
@@ -27,22 +26,14 @@ def predicted(reference, store):
 
 
 @pytest.fixture
-def tda(tmp_path, store, capsys, monkeypatch):
+def tda(tmp_path, store, call_program, monkeypatch):
     """Run the program in this process with a stand-in for the page; returns exit code, stdout, stderr."""
     import tdacoustic.reporting.html as html
 
     monkeypatch.setenv("TDACOUSTIC_STORE", str(store.folder))
     monkeypatch.setattr(html, "render_html", lambda document: "<!doctype html><title>stand-in</title>" + 2000 * " ")
     monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return call
+    return call_program
 
 
 def test_the_contracts_of_the_tables(tda, reference, tmp_path):

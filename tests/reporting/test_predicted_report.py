@@ -18,12 +18,14 @@ from tdacoustic.reporting.predicted_report import predicted_report
 from tdacoustic.reporting.sections.gear_words import hertz, newtons, significant
 from tdacoustic.reporting.sections.loads_over_speed import _rise_and_fall
 from tdacoustic.reporting.sections.printed import TABLE_5, is_of_the_paper
-from tdacoustic.results import FleetPrediction
+from tdacoustic.results import FleetPrediction, LogInput
 from tdacoustic.steps import Store
 from tdacoustic.workflows.predict import predict
 
 REFERENCE = load_fleet(Path(__file__).resolve().parents[2] / "calibration" / "reference-drive")
 RATTLING = {"operation.torque_n_m": 300.0, "gear_pair.1.transmission_error_um": (8.0,)}
+
+INPUTS = (LogInput("fleet.toml", "0" * 64, 0, "TOML"),)
 
 
 def predicted(values, sweep_hz=(), origin="calibrated"):
@@ -38,7 +40,7 @@ def predicted(values, sweep_hz=(), origin="calibrated"):
         down = branch_of_sweep(model.unit.system, sweep_hz[::-1], torques)
         sweep = SpeedSweep(tuple(hz * km_h_per_hz for hz in sweep_hz), up, down)
         prediction = dataclasses.replace(prediction, sweep=sweep)
-    return FleetPrediction(fleet, prediction, {}, "0" * 64, ())
+    return FleetPrediction(fleet, prediction, {}, INPUTS, ())
 
 
 def with_record(result, name, km_h):
@@ -312,7 +314,7 @@ def test_every_parameter_of_the_gear_model_is_listed_with_its_standing(reference
 def test_where_the_numbers_come_from_is_said(reference):
     document = predicted_report(reference)
     (row,) = table(document, "inputs")
-    assert row["sha256"] == reference.sha256
+    assert row["sha256"] == reference.inputs[0].sha256
     assert {row["label"] for row in table(document, "steps")} == {"up", "down"}
     assert "harmonics" in words(document) and "The backlash is 200 µm" in words(document)
 
@@ -415,7 +417,7 @@ def test_one_condition_without_helix_angles_renders():
     fleet = REFERENCE.replaced({"operation.train_speed_km_h": (60.0,)})
     operation = fleet.operation.model_copy(update={"helix_angle_deg": None})
     fleet = dataclasses.replace(fleet, operation=operation)
-    result = FleetPrediction(fleet, DriveModel(fleet).evaluate(), {}, "0" * 64, ())
+    result = FleetPrediction(fleet, DriveModel(fleet).evaluate(), {}, INPUTS, ())
     document = predicted_report(result)
     assert "helix-sweep" not in [section.id for section in document.sections]
     assert {row["verdict"] for row in table(document, "force-features")} == {"not judged"}
@@ -440,7 +442,7 @@ def test_a_drive_that_is_not_the_papers_is_not_held_against_it():
 def test_a_calibrated_constant_and_a_weighting_are_said():
     values = {"masuda.constant_db": -10.0, "masuda.weighting": "A", "masuda.displacement": "static_ratio"}
     fleet = REFERENCE.replaced(values, stderr={"masuda.constant_db": 1.5})
-    document = predicted_report(FleetPrediction(fleet, DriveModel(fleet).evaluate(), {}, "0" * 64, ()))
+    document = predicted_report(FleetPrediction(fleet, DriveModel(fleet).evaluate(), {}, INPUTS, ()))
     said = words(document)
     assert (
         "1 m in dB(A) re 20 µPa with C = \u221210 dB, X the peak to peak of the DTE over the static compression" in said

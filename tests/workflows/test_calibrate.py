@@ -6,7 +6,6 @@ from pathlib import Path
 
 import pytest
 
-from tdacoustic.cli import main
 from tdacoustic.fleet import load_fleet
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -18,19 +17,11 @@ LEVEL = '[[level]]\ncondition = "{}"\ndistance_m = 4.0\nlevel_db = {}\nsigma_db 
 
 
 @pytest.fixture
-def tda(tmp_path, capsys, monkeypatch):
+def tda(tmp_path, call_program, monkeypatch):
     """Run the program in this process, in a folder of its own; returns exit code, stdout, stderr."""
     monkeypatch.setenv("TDACOUSTIC_STORE", str(tmp_path / "store"))
     monkeypatch.chdir(tmp_path)
-
-    def call(*arguments):
-        capsys.readouterr()
-        with pytest.raises(SystemExit) as ended:
-            main([str(argument) for argument in arguments])
-        said = capsys.readouterr()
-        return ended.value.code or 0, said.out, said.err
-
-    return call
+    return call_program
 
 
 def test_the_printed_levels_alone(tda, tmp_path):

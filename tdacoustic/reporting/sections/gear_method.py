@@ -34,7 +34,7 @@ def gear_method(result: FleetPrediction) -> Section:
 
 def _input(result: FleetPrediction) -> Table:
     columns = (Column("file", "Fleet file"), Column("format", "Format"), Column("sha256", "SHA-256"))
-    return Table("inputs", "Input", columns, [(result.fleet.path.name, "TOML", result.sha256)])
+    return Table("inputs", "Input", columns, [(file.written, file.format, file.sha256) for file in result.inputs])
 
 
 def _method(result: FleetPrediction) -> str:
