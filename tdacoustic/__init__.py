@@ -10,7 +10,7 @@ From a log to a plotted spectrum with its lines::
     td.plot(spectrum, lines)
 
 From a campaign to its tables as pandas frames: ``td.analyze("campaign.toml").tables["lines"]``; from a fleet to
-those of its model: ``td.predict("fleet.toml").tables["conditions"]``.
+those of its model: ``td.predict("fleet.toml").tables["conditions"]``; and all of it: ``td.run("campaign.toml")``.
 """
 
 from importlib import import_module
@@ -30,6 +30,7 @@ _PUBLIC = {
     "plot": "tdacoustic.workflows.interactive",
     "predict": "tdacoustic.workflows.predict",
     "read": "tdacoustic.workflows.interactive",
+    "run": "tdacoustic.workflows.run",
     "scan": "tdacoustic.formats",
     "spectrum": "tdacoustic.workflows.interactive",
 }

@@ -20,6 +20,7 @@ from tdacoustic.errors import TdacousticError
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign as LoadedCampaign
     from tdacoustic.results import Analysis
+    from tdacoustic.workflows.output import OutputFolder
 
 __all__ = ["app", "main"]
 
@@ -84,25 +85,19 @@ def _toml(campaign: Path) -> Path:
     return campaign / "campaign.toml" if campaign.is_dir() else campaign
 
 
-def _warn(problems: Iterable[str]) -> None:
-    for problem in problems:
-        _say(f"warning: {problem}")
-
-
-def _measure(
-    command: str, campaign: Path, out: Path | None, overwrite: bool, store: Path | None, jobs: int | None, quiet: bool
-) -> tuple[Analysis, Path]:
+def _opened(campaign: Path, out: Path | None, overwrite: bool) -> tuple[LoadedCampaign, Path, OutputFolder]:
+    """A campaign and its output folder: a wrong one, or something in the way, is said before anything is computed."""
     from tdacoustic.campaign import load_campaign
     from tdacoustic.workflows.output import OutputFolder, default_output
-    from tdacoustic.workflows.write import write_analysis
 
-    loaded = load_campaign(campaign)  # a wrong campaign is said before anything else
+    loaded = load_campaign(campaign)
     target = out or default_output(_toml(campaign))
-    folder = OutputFolder(target, _toml(campaign), overwrite)
-    analysis = _analysed(loaded, store, jobs, quiet)
-    write_analysis(analysis, folder, command)
-    _warn(analysis.problems)
-    return analysis, target
+    return loaded, target, OutputFolder(target, _toml(campaign), overwrite)
+
+
+def _warn(problems: Iterable[str], quiet: bool) -> None:
+    for problem in () if quiet else problems:
+        _say(f"warning: {problem}")
 
 
 @app.command()
@@ -168,7 +163,7 @@ def check(
             )
         counts = table["verdict"].value_counts()
         print(", ".join(f"{counts.get(word, 0)} {word}" for word in ("ok", "warning", "bad")))
-    _warn(analysis.problems)
+    _warn(analysis.problems, quiet)
     unusable = unusable_runs(analysis)
     if unusable:
         raise TdacousticError("\n".join(unusable))
@@ -184,7 +179,12 @@ def analyze(
     quiet: Quiet = False,
 ) -> None:
     """Analyse the logs of a campaign: levels, spectra, lines."""
-    _, target = _measure("analyze", campaign, out, overwrite, store, jobs, quiet)
+    from tdacoustic.workflows.write import write_analysis
+
+    loaded, target, folder = _opened(campaign, out, overwrite)
+    analysis = _analysed(loaded, store, jobs, quiet)
+    write_analysis(analysis, folder, "analyze")
+    _warn(analysis.problems, quiet)
     if not quiet:
         print(target / "report.html")
 
@@ -211,7 +211,7 @@ def predict(
     with _progress(quiet) as progress:
         result = compute(loaded, store, progress)
     write_prediction(result, folder)
-    _warn(result.prediction.doubts)
+    _warn(result.prediction.doubts, quiet)
     if not quiet:
         print(target / "report.html")
 
@@ -226,18 +226,14 @@ def calibrate(
     quiet: Quiet = False,
 ) -> None:
     """Fit the model of a campaign's fleet to its measured levels."""
-    from tdacoustic.campaign import load_campaign
     from tdacoustic.workflows.calibrate import calibrate as compute
-    from tdacoustic.workflows.output import OutputFolder, default_output
     from tdacoustic.workflows.write import write_calibration
 
-    loaded = load_campaign(campaign)  # a wrong campaign is said before anything else
-    target = out or default_output(_toml(campaign))
-    folder = OutputFolder(target, _toml(campaign), overwrite)
+    loaded, target, folder = _opened(campaign, out, overwrite)
     with _progress(quiet) as progress:
         result = compute(loaded, store, jobs, progress)
     write_calibration(result, folder)
-    _warn(result.calibration.doubts)
+    _warn(result.calibration.doubts, quiet)
     if not quiet:
         print(target / "report.html")
 
@@ -252,11 +248,17 @@ def run(
     quiet: Quiet = False,
 ) -> None:
     """Do all that can be done for a campaign and write one report: the main job."""
-    from tdacoustic.workflows.summary import summary_lines
+    from tdacoustic.workflows.run import run as compute
+    from tdacoustic.workflows.summary import run_lines
+    from tdacoustic.workflows.write import write_run
 
-    analysis, target = _measure("run", campaign, out, overwrite, store, jobs, quiet)
+    loaded, target, folder = _opened(campaign, out, overwrite)
+    with _progress(quiet) as progress:
+        result = compute(loaded, store, jobs, progress)
+    write_run(result, folder)
+    _warn((*result.problems, *result.doubts), quiet)
     if not quiet:
-        for line in summary_lines(analysis):
+        for line in run_lines(result):
             print(line)
         print(target / "report.html")
 
@@ -277,7 +279,7 @@ def synthesize(
     with _progress(quiet) as progress:
         hear: Any = None if progress is None else (lambda name: progress(f"run {name}", 0, 1))
         result = make(recipe, out or recipe.parent, seed, overwrite=overwrite, on_run=hear)
-    _warn(result.doubts)
+    _warn(result.doubts, quiet)
     if not quiet:
         print(result.campaign)
 

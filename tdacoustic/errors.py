@@ -13,6 +13,7 @@ __all__ = [
     "FormatError",
     "GearError",
     "MissingFileError",
+    "MissingPackageError",
     "MotorError",
     "OutputError",
     "RadiationError",
@@ -36,6 +37,10 @@ class MissingFileError(TdacousticError, FileNotFoundError):
 
     def __str__(self) -> str:
         return str(self.args[0]) if self.args else ""
+
+
+class MissingPackageError(TdacousticError, ImportError):
+    """A package that an option needs is not installed."""
 
 
 class UnitError(TdacousticError, ValueError):

@@ -10,11 +10,12 @@ from typing import Any, Final
 from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
+from tdacoustic.campaign.calibration import CalibrationParameter, CalibrationSettings
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.model import CampaignFile
 from tdacoustic.campaign.runs import CampaignRun
-from tdacoustic.campaign.settings import AnalysisSettings, CalibrationSettings
+from tdacoustic.campaign.settings import AnalysisSettings
 from tdacoustic.errors import CampaignError
 from tdacoustic.toml_models import TOP_LEVEL, Vocabulary, file_error, joined, problem_words, shown
 
@@ -27,12 +28,15 @@ _TABLES: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
     {"analysis": AnalysisSettings, "calibration": CalibrationSettings}
 )
 
+_PARAMETER: Final = "[[calibration.parameter]]"
+
 VOCABULARY: Final = Vocabulary(
     MappingProxyType(
         {
             TOP_LEVEL: ("schema", *CampaignFile.model_fields),
             **{f"[[{name}]]": tuple(model.model_fields) for name, model in _ARRAYS.items()},
             **{f"[{name}]": tuple(model.model_fields) for name, model in _TABLES.items()},
+            _PARAMETER: tuple(CalibrationParameter.model_fields),
         }
     )
 )
@@ -56,6 +60,11 @@ def _place(raw: Mapping[str, Any], loc: Sequence[int | str], labels: Mapping[int
         if head == "run" and index in labels:
             where = f"{labels[index]} ({where})" if name is not None else labels[index]
         return where, f"[[{head}]]", list(loc[2:])
+    if head == "calibration" and len(loc) >= 3 and loc[1] == "parameter" and isinstance(loc[2], int):
+        entry = raw["calibration"]["parameter"][loc[2]]
+        name = entry.get("name") if isinstance(entry, dict) else None
+        label = shown(name) if isinstance(name, str) else str(loc[2] + 1)
+        return f"{_PARAMETER} {label}", _PARAMETER, list(loc[3:])
     if head in _TABLES and len(loc) >= 2:
         return f"[{head}]", f"[{head}]", list(loc[1:])
     return "", TOP_LEVEL, list(loc)

@@ -8,10 +8,11 @@ from typing import Any, Final, Literal
 
 from pydantic import Field
 
+from tdacoustic.campaign.calibration import CalibrationSettings
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.runs import CampaignRun
-from tdacoustic.campaign.settings import AnalysisSettings, CalibrationSettings
+from tdacoustic.campaign.settings import AnalysisSettings
 from tdacoustic.campaign.values import StatedPath, WrittenPath
 from tdacoustic.errors import CampaignError
 from tdacoustic.toml_models import Table, Text
@@ -133,4 +134,13 @@ class Campaign:
     def settings(self) -> dict[str, Any]:
         """Every setting with its value, under keys such as ``analysis.overlap``, for the report."""
         tables: dict[str, Table] = {"analysis": self.analysis, "calibration": self.calibration}
-        return {f"{name}.{key}": value for name, table in tables.items() for key, value in table}
+        return {f"{name}.{key}": _plain(value) for name, table in tables.items() for key, value in table}
+
+
+def _plain(value: Any) -> Any:
+    """A setting as numbers and texts; a table in words."""
+    if isinstance(value, tuple):
+        return tuple(_plain(entry) for entry in value)
+    if isinstance(value, Table):
+        return ", ".join(f"{key} = {entry}" for key, entry in value if entry is not None)
+    return str(value) if isinstance(value, WrittenPath) else value

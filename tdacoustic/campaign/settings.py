@@ -1,4 +1,4 @@
-"""``[analysis]`` and ``[calibration]``: settings, every one with a default."""
+"""``[analysis]``: settings, every one with a default."""
 
 from __future__ import annotations
 
@@ -7,16 +7,9 @@ from typing import Annotated
 from pydantic import AfterValidator, Field
 
 from tdacoustic.campaign.values import FrequencyBand
-from tdacoustic.toml_models import NonNegative, Positive, Table, Text
+from tdacoustic.toml_models import Positive, Table, each_once
 
-__all__ = ["AnalysisSettings", "CalibrationSettings"]
-
-
-def _each_once(values: tuple[object, ...]) -> tuple[object, ...]:
-    twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
-    if twice is not None:
-        raise ValueError(f"names {twice!r} twice")
-    return values
+__all__ = ["AnalysisSettings"]
 
 
 class AnalysisSettings(Table):
@@ -42,7 +35,7 @@ class AnalysisSettings(Table):
         Of the supply whose hum is looked for.
     """
 
-    orders: Annotated[tuple[Positive, ...], AfterValidator(_each_once)] = ()
+    orders: Annotated[tuple[Positive, ...], AfterValidator(each_once)] = ()
     level_band_hz: FrequencyBand | None = None
     frequency_resolution_hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 1.0
     overlap: Annotated[float, Field(ge=0.0, le=0.95)] = 0.5
@@ -50,21 +43,3 @@ class AnalysisSettings(Table):
     line_prominence_db: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
     speed_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.03
     mains_hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 50.0
-
-
-class CalibrationSettings(Table):
-    """``[calibration]``.
-
-    Parameters
-    ----------
-    free : tuple of str
-        Parameters of the fleet to fit.
-    model_sigma_db : float
-        Scatter of the model itself, one standard deviation.
-    """
-
-    free: Annotated[tuple[Text, ...], AfterValidator(_each_once)] = (
-        "masuda.constant_db",
-        "gear_dynamics.mesh_damping_ratio",
-    )
-    model_sigma_db: NonNegative = 4.0

@@ -19,6 +19,8 @@ __all__ = ["LevelAt", "PointField", "Receiver"]
 
 Path = Literal["structure", "mesh", "motor", "total"]
 PATHS: tuple[Path, ...] = ("structure", "mesh", "motor", "total")
+Weighting = Literal["Z", "A"]
+WEIGHTINGS: tuple[Weighting, ...] = ("Z", "A")
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class LevelAt:
 
     receiver: str
     path: Path
-    weighting: Literal["Z", "A"]
+    weighting: Weighting
     level_db: float | None
 
 
@@ -67,6 +69,13 @@ class PointField:
     Parameters
     ----------
     fleet : Fleet
+
+    Attributes
+    ----------
+    surface : Receiver
+        That of ``[radiation] sphere_radius_m``.
+    adds : tuple of str
+        Paths that the total adds.
     """
 
     def __init__(self, fleet: Fleet) -> None:
@@ -76,7 +85,7 @@ class PointField:
         self._ground_m = -0.5 * fleet.train.wheel_diameter_m if self._space == "half" else None
         self.surface = Receiver(f"{radiation.sphere_radius_m.value:g} m", radiation.sphere_radius_m.value)
         self._circle_m = radiation.circle_radius_m.value
-        self._adds = paths_of_total(fleet)
+        self.adds = paths_of_total(fleet)
 
     def transfer_db(self, source: SoundSource, receiver: Receiver) -> float:
         """Level at a receiver less the sound power level of a source."""
@@ -97,18 +106,29 @@ class PointField:
         """
         found = []
         for receiver in receivers:
-            at = [source.sound_power_level_db + self.transfer_db(source, receiver) for source in sources]
-            weights = [float(a_weighting_db(source.frequency_hz)) for source in sources]
-            for weighting, extra in (("Z", [0.0] * len(at)), ("A", weights)):
-                held = [level + more for level, more in zip(at, extra, strict=True)]
-                found += [
-                    LevelAt(receiver.name, path, weighting, self._of_path(path, sources, held))  # type: ignore[arg-type]
-                    for path in PATHS
-                ]
+            for weighting in WEIGHTINGS:
+                held = self.received_db(sources, receiver, weighting)
+                found += [LevelAt(receiver.name, path, weighting, self._of_path(path, sources, held)) for path in PATHS]
         return tuple(found)
 
+    def received_db(
+        self, sources: Sequence[SoundSource], receiver: Receiver, weighting: Weighting = "Z"
+    ) -> list[float]:
+        """Return the level of each source at a receiver.
+
+        Parameters
+        ----------
+        sources : sequence of SoundSource
+        receiver : Receiver
+        weighting : {"Z", "A"}
+        """
+        at = [source.sound_power_level_db + self.transfer_db(source, receiver) for source in sources]
+        if weighting == "Z":
+            return at
+        return [level + float(a_weighting_db(s.frequency_hz)) for level, s in zip(at, sources, strict=True)]
+
     def _of_path(self, path: Path, sources: Sequence[SoundSource], levels_db: Sequence[float]) -> float | None:
-        wanted = self._adds if path == "total" else (path,)
+        wanted = self.adds if path == "total" else (path,)
         return overall_level_db([level for s, level in zip(sources, levels_db, strict=True) if s.path in wanted])
 
     def around_db(self, sources: Sequence[SoundSource], angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -117,7 +137,7 @@ class PointField:
         for angle in np.radians(angles_deg):
             place = (self._circle_m * math.cos(angle), self._circle_m * math.sin(angle), 0.0)
             receiver = Receiver("circle", self._circle_m, place)
-            held = [s for s in sources if s.path in self._adds]
+            held = [s for s in sources if s.path in self.adds]
             level = overall_level_db([s.sound_power_level_db + self.transfer_db(s, receiver) for s in held])
             around.append(math.nan if level is None else level)
         return np.array(around)

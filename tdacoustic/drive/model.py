@@ -15,7 +15,7 @@ from tdacoustic.drive.doubts import gear_doubts, sound_doubts
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
 from tdacoustic.drive.levels import PointField, Receiver
 from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase, Prediction
-from tdacoustic.drive.sources import MotorSources, mesh_source
+from tdacoustic.drive.sources import MotorSources, SoundSource, mesh_source
 from tdacoustic.errors import FleetError, GearError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import SteadyState, bearing_forces, masuda_level_db, steady_state
@@ -32,6 +32,13 @@ class DriveModel:
     unit : GearUnit, optional
         Its gears, where they are known already.
 
+    Attributes
+    ----------
+    fleet : Fleet
+    unit : GearUnit
+    field : PointField
+        Of its sources.
+
     Raises
     ------
     FleetError
@@ -42,7 +49,7 @@ class DriveModel:
         self.fleet = fleet
         self.unit = unit or gear_unit_of(fleet)
         self._motor = MotorSources(fleet)
-        self._field = PointField(fleet)
+        self.field = PointField(fleet)
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
@@ -77,7 +84,7 @@ class DriveModel:
             *sound_doubts(self.fleet, sound, self._motor.without_amplitude),
         )
         return Prediction(
-            self.unit, states, sound, self._field.surface.name, tuple(around), helix, None, tuple(dict.fromkeys(doubts))
+            self.unit, states, sound, self.field.surface.name, tuple(around), helix, None, tuple(dict.fromkeys(doubts))
         )
 
     def sound(self, condition: Condition, masuda_db: float | None, receivers: Sequence[Receiver] = ()) -> DriveSound:
@@ -91,17 +98,25 @@ class DriveModel:
         receivers : sequence of Receiver
             Besides the surface.
         """
-        mesh = mesh_source(self.fleet, self.unit.mesh_hz(condition.motor_hz), masuda_db)
-        sources = (*self._motor.at(condition), *((mesh,) if mesh is not None else ()))
-        levels = self._field.levels(sources, (self._field.surface, *receivers))
+        sources = (*self.motor_sources(condition), *self.gear_sources(condition, masuda_db))
+        levels = self.field.levels(sources, (self.field.surface, *receivers))
         return DriveSound(condition.name, sources, levels)
+
+    def motor_sources(self, condition: Condition) -> tuple[SoundSource, ...]:
+        """Return the motor's tones in a condition."""
+        return self._motor.at(condition)
+
+    def gear_sources(self, condition: Condition, masuda_db: float | None) -> tuple[SoundSource, ...]:
+        """Return the meshing noise in a condition; of no level, none."""
+        mesh = mesh_source(self.fleet, self.unit.mesh_hz(condition.motor_hz), masuda_db)
+        return () if mesh is None else (mesh,)
 
     def _sound_of(self, state: GearState, receivers: Sequence[Receiver]) -> DriveSound:
         return self.sound(state.condition, state.masuda_db, receivers)
 
     def _around(self, sweep: Literal["speed", "helix"], value: float, sound: DriveSound) -> Directivity:
         angles = np.arange(0.0, 360.0, 5.0)
-        return Directivity(sweep, value, angles, self._field.around_db(sound.sources, angles))
+        return Directivity(sweep, value, angles, self.field.around_db(sound.sources, angles))
 
     def gears(self, condition: Condition, unit: GearUnit | None = None) -> GearState:
         """Return the gears in one condition.

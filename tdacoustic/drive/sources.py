@@ -85,7 +85,7 @@ class MotorSources:
         )
 
     def at(self, condition: Condition) -> tuple[SoundSource, ...]:
-        """Return the motor's tones in a condition, by their order in the fleet.
+        """Return the motor's tones in a condition, by their order in the fleet, with ``[model] motor_gain_db``.
 
         Raises
         ------
@@ -93,6 +93,7 @@ class MotorSources:
             An excitation cannot be computed.
         """
         found = []
+        gain_db = self._fleet.model.motor_gain_db.value
         frequencies_hz = self._frequencies_hz(condition.motor_hz)
         for excitation in self._excitations:
             frequency_hz = frequencies_hz.get(excitation.name, 0.0)
@@ -100,7 +101,7 @@ class MotorSources:
                 continue
             level_db = self._level_db(excitation, frequency_hz, 60.0 * condition.motor_hz)
             if level_db is not None:
-                found.append(SoundSource("motor", excitation.name, frequency_hz, level_db, self._position_m))
+                found.append(SoundSource("motor", excitation.name, frequency_hz, level_db + gain_db, self._position_m))
         return tuple(found)
 
     def _frequencies_hz(self, motor_hz: float) -> dict[str, float]:

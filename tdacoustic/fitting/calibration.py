@@ -3,170 +3,58 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final, Literal
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from tdacoustic.drive import DriveSound
 from tdacoustic.errors import FittingError
+from tdacoustic.fitting.calibrated import Calibration, FittedLevel, FittedParameter, LeftOut
+from tdacoustic.fitting.doubts import (
+    doubts_of_data,
+    doubts_of_fleet,
+    doubts_of_posterior,
+    doubts_of_transfer,
+    doubts_of_values,
+)
+from tdacoustic.fitting.free import free_parameter
 from tdacoustic.fitting.intervals import ProfileInterval, profile_intervals
-from tdacoustic.fitting.least_squares import Fit, Residuals, fit
-from tdacoustic.fitting.levels import SILENCE_DB, LevelModel, MeasuredLevel
+from tdacoustic.fitting.least_squares import fit
+from tdacoustic.fitting.levels import OFFSET, SILENCE_DB, LevelModel, MeasuredLevel
+from tdacoustic.fitting.loss import cost_of, with_priors
+from tdacoustic.fitting.next_measurement import Candidate, next_measurements
+from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
+from tdacoustic.fitting.posterior import sample_posterior
+from tdacoustic.fitting.residuals import LevelResiduals
+from tdacoustic.fitting.scatter import fitted_model_sigma_db
+from tdacoustic.fitting.settings import MODEL_SIGMA_DB, FitSettings
+from tdacoustic.fitting.transfer import Transferred
 from tdacoustic.fleet import Fleet
 
 __all__ = ["Calibration", "FittedLevel", "FittedParameter", "LeftOut", "calibrate_fleet", "free_parameter"]
 
-STARTS: Final = 16
-CORRELATED: Final = 0.95
-OUTLYING: Final = 2.5
-"""Residual over its standard deviation from which a condition is called outlying [assumed]."""
+RESOLUTION: Final = 1e-4
+STEP: Final = 1e-3
+"""Singular value over the largest below which the levels do not see a direction, and the step of differences over the
+width of the bounds: the gears' motions are exact to some 1e-6 only."""
 
-CANNOT_REACH: Final = 2.0
-"""Root mean square of the weighted residuals from which the model is said not to reach the data [assumed]."""
+_EXACT_STEPS: Final = 4
+_EXACT_CLOSE: Final = 1e-4
 
-ON_A_BOUND: Final = 1e-4
-
-Scale = Literal["linear", "log"]
-
-_BOUNDS: Final[dict[str, tuple[float, float, Scale]]] = {
-    "masuda.constant_db": (-100.0, 100.0, "linear"),
-    "model.structure_gain_db": (-60.0, 60.0, "linear"),
-    "gear_dynamics.mesh_damping_ratio": (0.005, 0.5, "log"),
-    "gear_dynamics.bearing_damping_ratio": (0.005, 0.5, "log"),
-}
-"""Bounds and scale of parameters that are often freed [assumed]; others get a tenth to ten times their value."""
-
-
-@dataclass(frozen=True)
-class FittedParameter:
-    """A parameter after the fit.
-
-    Parameters
-    ----------
-    key : str
-        Of the fleet.
-    value, initial, low, high : float
-        In the unit that the key names.
-    stderr : float or None
-        One standard deviation; None where it cannot be had.
-    ci95 : (float or None, float or None) or None
-        Profile-likelihood interval; an end is None where a bound comes before it.
-    """
-
-    key: str
-    value: float
-    initial: float
-    low: float
-    high: float
-    stderr: float | None
-    ci95: ProfileInterval | None
-
-
-@dataclass(frozen=True)
-class FittedLevel:
-    """A datum beside the model.
-
-    Parameters
-    ----------
-    datum : MeasuredLevel
-    before_db, predicted_db : float
-        The model's level with the fleet's values, and with the fitted ones.
-    sigma_db : float
-        One standard deviation of the measurement and of the model together.
-    """
-
-    datum: MeasuredLevel
-    before_db: float
-    predicted_db: float
-    sigma_db: float
-
-    @property
-    def error_db(self) -> float:
-        """Predicted less measured."""
-        return self.predicted_db - self.datum.level_db
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """What a fit without a condition predicts for it: predicted less measured, the mean over its data; None where the
-    others allow no fit.
-    """
-
-    condition: str
-    error_db: float | None
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """A calibrated fleet.
-
-    Parameters
-    ----------
-    fleet : Fleet
-        With the fitted values, their standard deviations and their origin.
-    parameters : tuple of FittedParameter
-    levels : tuple of FittedLevel
-    left_out : tuple of LeftOut
-    correlation : ndarray or None
-        Of the parameters, in their order; None where it cannot be had.
-    rank : int
-        Directions among the parameters that the data see.
-    chi_square : float
-        Of the weighted residuals, priors included.
-    before, after : tuple of DriveSound
-        The drive's sound in each condition, by contributions.
-    doubts : tuple of str
-        What must be known before the values are used; empty of a fit without any.
-    """
-
-    fleet: Fleet
-    parameters: tuple[FittedParameter, ...]
-    levels: tuple[FittedLevel, ...]
-    left_out: tuple[LeftOut, ...]
-    correlation: NDArray[np.float64] | None
-    rank: int
-    chi_square: float
-    before: tuple[DriveSound, ...]
-    after: tuple[DriveSound, ...]
-    doubts: tuple[str, ...]
-
-
-def free_parameter(fleet: Fleet, key: str) -> FreeParameter:
-    """Return a parameter of a fleet as one that a fit may move, with its usual bounds.
-
-    Parameters
-    ----------
-    fleet : Fleet
-    key : str
-        Of a single number.
-
-    Raises
-    ------
-    FittingError
-        It is no single number, or zero without usual bounds.
-    """
-    value = fleet.get(key).value
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FittingError(f"{fleet.path}: {key} is no single number and cannot be freed")
-    low, high, scale = _BOUNDS.get(key, (0.1 * value, 10.0 * value, "log"))
-    if scale == "log" and value <= 0.0:
-        raise FittingError(
-            f"{fleet.path}: {key} is {value:g}: a parameter is freed from a tenth to ten times its value"
-        )
-    return FreeParameter(key, float(value), min(low, float(value)), max(high, float(value)), None, scale)
+Intervals = dict[str, ProfileInterval]
 
 
 def calibrate_fleet(
     fleet: Fleet,
     data: Sequence[MeasuredLevel],
     free: Sequence[FreeParameter],
-    model_sigma_db: float,
+    settings: FitSettings | None = None,
     origin: str = "calibrated",
-    starts: int = STARTS,
+    model: LevelModel | None = None,
+    candidates: Sequence[Candidate] = (),
+    transferred: Sequence[Transferred] = (),
 ) -> Calibration:
     """Fit parameters of a fleet to measured levels.
 
@@ -174,152 +62,191 @@ def calibrate_fleet(
     ----------
     fleet : Fleet
     data : sequence of MeasuredLevel
+        Those in which the model is silent are left out, and said.
     free : sequence of FreeParameter
-        By keys of the fleet.
-    model_sigma_db : float
-        Scatter of the model itself, one standard deviation; added to that of each datum in squares.
+        By keys of the fleet; level offsets of campaigns and auxiliary parameters among them.
+    settings : FitSettings, optional
     origin : str
         Of the fitted values, written into the fleet.
-    starts : int
-        Of the search, spread over the bounds.
+    model : LevelModel, optional
+        Of the same fleet and data (`LevelModel.with_data`), where levels were computed before.
+    candidates : sequence of Candidate
+        Measurements that could be made next.
+    transferred : sequence of Transferred
+        What the priors in `free` were taken from, to be compared with what the data say without them.
 
     Raises
     ------
     FittingError
-        There are no data, or the model gives no level for them.
+        There are no data, or the model gives no level for any of them.
     """
-    if not data:
-        raise FittingError("there are no levels to calibrate with")
-    model = LevelModel(fleet, data)
-    before_db = model.levels_db({})
-    silent = [d.condition.name for d, level in zip(data, before_db, strict=True) if level <= SILENCE_DB]
-    if silent:
-        raise FittingError(
-            f"{fleet.path}: the model gives no level in condition {', '.join(dict.fromkeys(silent))}: none of the "
-            "paths that the total adds has a sound there"
-        )
-    residuals = _residuals(model, model_sigma_db)
-    found = fit(residuals, free, starts)
-    intervals = profile_intervals(residuals, found) if found.covariance is not None else {}
-    errors = found.standard_errors()
-    parameters = tuple(_fitted(parameter, found, errors, intervals) for parameter in free)
-    after_db = model.levels_db(found.values)
-    levels = tuple(
-        FittedLevel(datum, float(before), float(after), math.hypot(datum.sigma_db, model_sigma_db))
-        for datum, before, after in zip(data, before_db, after_db, strict=True)
-    )
-    left_out = tuple(_left_out(model, condition.name, found, model_sigma_db) for condition in model.conditions)
+    settings = settings or FitSettings()
+    held, said = _heard(fleet, data)
+    if model is None or len(held) != len(data):
+        model = LevelModel(fleet, held)
+    interpolated_db = model.prepare(free)
+    sigma_db, doubts = _model_sigma_db(model, free, settings)
+    residuals = LevelResiduals(model, sigma_db)
+    searched = fit(residuals, free, settings.starts, settings.loss, polish=False, resolution=RESOLUTION, step=STEP)
+    found = searched if interpolated_db is None else _exactly(searched, residuals.exactly())
+    freedom = float(searched.n_free) if settings.model_sigma_db is None and not doubts else None
+    with_intervals = searched.covariance is not None
+    ci95 = profile_intervals(residuals, searched, 0.95, freedom) if with_intervals else {}
+    ci68 = profile_intervals(residuals, searched, 0.68, freedom) if with_intervals else {}
+    parameters = tuple(_fitted(parameter, found, ci95, ci68) for parameter in free)
+    levels = _levels(model, residuals, found)
+    groups = dict.fromkeys(datum.group for datum in model.data)
+    left_out = tuple(_left_out(model, group, searched, sigma_db) for group in groups)
+    posterior = None if settings.posterior is None else sample_posterior(residuals, searched, settings.posterior)
+    compared = tuple(_compared(held, residuals, searched) for held in transferred)
+    of_fleet = {name: value for name, value in found.values.items() if "." in name and not name.startswith(OFFSET)}
+    errors = {p.key: p.stderr for p in parameters if p.stderr is not None and p.key in of_fleet}
     return Calibration(
-        fleet.replaced(found.values, stderr=errors, origin=origin),
+        fleet.replaced(of_fleet, stderr=errors, origin=origin),
         parameters,
         levels,
         left_out,
         found.correlation(),
         found.rank,
+        found.condition_number,
         found.chi_square,
+        found.n_free,
+        sigma_db,
+        settings,
+        interpolated_db,
         model.sounds({}),
         model.sounds(found.values),
-        tuple(_doubts(found, parameters, levels, fleet)),
+        next_measurements(model, found, candidates, sigma_db),
+        posterior,
+        compared,
+        (
+            *said,
+            *doubts,
+            *doubts_of_values(residuals, searched, parameters),
+            *doubts_of_data(levels, left_out, found),
+            *doubts_of_fleet(fleet),
+            *doubts_of_posterior(posterior),
+            *doubts_of_transfer(compared),
+        ),
     )
 
 
-def _residuals(model: LevelModel, model_sigma_db: float) -> Residuals:
-    measured = np.array([datum.level_db for datum in model.data])
-    sigma = np.array([math.hypot(datum.sigma_db, model_sigma_db) for datum in model.data])
+def _heard(fleet: Fleet, data: Sequence[MeasuredLevel]) -> tuple[list[MeasuredLevel], list[str]]:
+    """Return the data for which the model has a sound, and what was left out in words."""
+    if not data:
+        raise FittingError("there are no levels to calibrate with")
+    levels = LevelModel(fleet, data).levels_db({})
+    silent = [datum for datum, level in zip(data, levels, strict=True) if level <= SILENCE_DB]
+    if len(silent) == len(data):
+        names = ", ".join(dict.fromkeys(datum.condition.name for datum in silent))
+        raise FittingError(
+            f"{fleet.path}: the model gives no level in condition {names}: none of the paths that the total adds has a "
+            "sound there"
+        )
+    overall = dict.fromkeys(d.condition.name for d in silent if d.band_hz is None)
+    said = []
+    if overall:
+        said.append(
+            f"the model gives no level in condition {', '.join(overall)}, none of the paths that the total adds has a "
+            "sound there: what was measured there is not used"
+        )
+    n_bands = sum(datum.band_hz is not None for datum in silent)
+    if n_bands:
+        said.append(
+            f"{n_bands} of {sum(d.band_hz is not None for d in data)} levels of bands and orders are not used: the "
+            "model has no line there"
+        )
+    return [datum for datum, level in zip(data, levels, strict=True) if level > SILENCE_DB], said
 
-    def residuals(values: Mapping[str, float]) -> NDArray[np.float64]:
-        return np.asarray((model.levels_db(values) - measured) / sigma)
 
-    return residuals
+def _model_sigma_db(model: LevelModel, free: Sequence[FreeParameter], settings: FitSettings) -> tuple[float, list[str]]:
+    if settings.model_sigma_db is not None:
+        return settings.model_sigma_db, []
+    try:
+        return fitted_model_sigma_db(model, free, settings.starts, settings.loss), []
+    except FittingError as error:
+        return MODEL_SIGMA_DB, [f"the model's scatter cannot be fitted: {error}; {MODEL_SIGMA_DB:g} dB are assumed"]
 
 
-def _fitted(
-    parameter: FreeParameter, found: Fit, errors: dict[str, float] | None, intervals: dict[str, ProfileInterval]
-) -> FittedParameter:
-    return FittedParameter(
-        parameter.name,
-        found.values[parameter.name],
-        parameter.initial,
-        parameter.low,
-        parameter.high,
-        None if errors is None else errors.get(parameter.name),
-        intervals.get(parameter.name),
+def _exactly(searched: Fit, residuals: LevelResiduals) -> Fit:
+    """Return the optimum of the computed levels, next to that of the interpolated ones, whose slopes serve."""
+    weighted = with_priors(residuals, searched.parameters)
+    moved, values = searched.moved, searched.values
+    chi_square = cost_of(weighted(values), searched.loss)
+    if searched.loss == "linear" and moved:
+        scale = np.linalg.norm(searched.jacobian, axis=0)
+        for _ in range(_EXACT_STEPS):
+            columns = searched.jacobian / np.where(scale > 0.0, scale, 1.0)
+            step = np.linalg.lstsq(columns, -weighted(values), rcond=RESOLUTION)[0]
+            inner = {
+                p.name: min(max(p.inner(values[p.name]) + float(d / s), p.inner(p.low)), p.inner(p.high))
+                for p, d, s in zip(moved, step, np.where(scale > 0.0, scale, math.inf), strict=True)
+            }
+            trial = searched.at(inner)
+            reached = cost_of(weighted(trial))
+            if not reached < chi_square:
+                break
+            chi_square, values = reached, trial
+            if float(np.abs(step).max()) < _EXACT_CLOSE:
+                break
+    return replace(searched, values=values, chi_square=chi_square)
+
+
+def _fitted(parameter: FreeParameter, found: Fit, ci95: Intervals, ci68: Intervals) -> FittedParameter:
+    name = parameter.name
+    value = found.values[name]
+    errors = found.standard_errors()
+    stderr = None if errors is None else errors.get(name)
+    if not parameter.is_moved:
+        stderr = found.error_of(lambda values: values[name])
+    prior = parameter.prior
+    if prior is not None and parameter.scale == "log":
+        prior = (math.exp(prior[0]), math.exp(prior[0]) * prior[1])
+    bounds = parameter.low, parameter.high
+    intervals = ci95.get(name), ci68.get(name)
+    return FittedParameter(name, value, parameter.initial, *bounds, stderr, *intervals, prior, parameter.expression)
+
+
+def _levels(model: LevelModel, residuals: LevelResiduals, found: Fit) -> tuple[FittedLevel, ...]:
+    before, after = model.levels_db({}), model.levels_db(found.values, exact=True)
+    return tuple(
+        FittedLevel(datum, float(before[row]), float(after[row]), residuals.sigma_db(row))
+        for row, datum in enumerate(model.data)
     )
 
 
-def _left_out(model: LevelModel, condition: str, found: Fit, model_sigma_db: float) -> LeftOut:
-    others = model.without(condition)
-    if not others.data:
-        return LeftOut(condition, None)
+def _left_out(model: LevelModel, group: str, found: Fit, model_sigma_db: float) -> LeftOut:
+    others = LevelResiduals(model, model_sigma_db, without=group)
+    if not others.rows.size:
+        return LeftOut(group, None)
     started = [parameter.starting_at(found.values[parameter.name]) for parameter in found.parameters]
-    again = fit(_residuals(others, model_sigma_db), started, polish=False)
-    predicted = model.levels_db(again.values)
-    errors = [
-        float(level) - datum.level_db
-        for level, datum in zip(predicted, model.data, strict=True)
-        if datum.condition.name == condition
+    again = fit(others, started, loss=found.loss, polish=False, resolution=RESOLUTION, step=STEP)
+    rows = [row for row, datum in enumerate(model.data) if datum.group == group]
+    measured = float(np.mean([model.data[row].level_db for row in rows]))
+    mean_level = _mean_level(model, rows)
+    spread = again.error_of(mean_level)
+    own = math.sqrt(float(np.mean([model.data[row].sigma_db ** 2 for row in rows])) / len(rows))
+    sigma_db = None if spread is None else math.hypot(spread, own, model_sigma_db)
+    return LeftOut(group, mean_level(again.values) - measured, sigma_db)
+
+
+def _mean_level(model: LevelModel, rows: Sequence[int]) -> Callable[[Mapping[str, float]], float]:
+    return lambda values: float(model.levels_db(values)[list(rows)].mean())
+
+
+def _compared(held: Transferred, residuals: LevelResiduals, found: Fit) -> Transferred:
+    """What the data say of a transferred parameter where it alone has lost its prior."""
+    started = [
+        replace(p.starting_at(found.values[p.name]), prior=None if p.name == held.key else p.prior)
+        for p in found.parameters
     ]
-    return LeftOut(condition, sum(errors) / len(errors))
-
-
-def _doubts(
-    found: Fit, parameters: tuple[FittedParameter, ...], levels: tuple[FittedLevel, ...], fleet: Fleet
-) -> Iterator[str]:
-    yield from _doubts_of_values(found, parameters)
-    conditions = {level.datum.condition.name for level in levels}
-    if len(conditions) == 1:
-        yield "all data are of one condition: what depends on speed cannot be told from what does not"
-    rms = math.sqrt(sum((level.error_db / level.sigma_db) ** 2 for level in levels) / len(levels))
-    worst = max(levels, key=lambda level: abs(level.error_db))
-    if rms > CANNOT_REACH:
-        yield (
-            f"the model does not reach the data: the misfit is {rms:.1f} standard deviations rms, at worst "
-            f"{worst.error_db:+.1f} dB in condition {worst.datum.condition.name}"
-        )
-    scatter = np.array([level.error_db / level.sigma_db for level in levels])
-    for index, (level, ratio) in enumerate(zip(levels, scatter, strict=True)):
-        others = np.delete(scatter, index)
-        if abs(ratio) > OUTLYING and others.size and abs(ratio) > 3.0 * float(np.abs(others).mean()):
-            yield (
-                f"condition {level.datum.condition.name} is outlying: the model is {level.error_db:+.1f} dB off there, "
-                f"{abs(ratio):.1f} standard deviations"
-            )
-    if fleet.model.gear_path.value == "sum":
-        yield 'gear counted twice: gear_path = "sum" adds the bearing forces\' sound to a level that already holds it'
-    if fleet.masuda.placement.value == "inside":
-        yield (
-            "Masuda's source is inside the housing: nothing of it reaches a receiver, so its constant cannot be found"
-        )
-
-
-def _doubts_of_values(found: Fit, parameters: tuple[FittedParameter, ...]) -> Iterator[str]:
-    if found.rank < len(found.moved):
-        yield (
-            f"the data see {found.rank} of {len(found.moved)} directions among the parameters: these cannot all be "
-            "determined"
-        )
-    data = found.jacobian[: found.n_data]
-    for column, parameter in zip(data.T, found.moved, strict=True):
-        if float(np.abs(column).max(initial=0.0)) * max(1.0, abs(parameter.inner(found.values[parameter.name]))) < 1e-9:
-            yield f"{parameter.name} changes none of the levels: the data cannot see it"
-    for parameter, fitted in zip(found.parameters, parameters, strict=True):
-        place, low, high = (parameter.inner(value) for value in (fitted.value, fitted.low, fitted.high))
-        width = high - low
-        if math.isfinite(width) and min(place - low, high - place) <= ON_A_BOUND * width:
-            end = fitted.low if place - low < high - place else fitted.high
-            yield f"{parameter.name} ended on its bound {end:g}: the optimum may lie beyond it"
-        elif fitted.ci95 is not None and None in fitted.ci95:
-            yield f"the interval of {parameter.name} reaches a bound before it ends: the data do not determine it"
-    correlation = found.correlation()
-    if correlation is not None:
-        for i, first in enumerate(found.moved):
-            for j, second in enumerate(found.moved[:i]):
-                if abs(correlation[i, j]) > CORRELATED:
-                    yield (
-                        f"{second.name} and {first.name} are correlated by {correlation[i, j]:+.3f}: each hides the "
-                        "other"
-                    )
-    near = [chi for chi, _ in found.minima if chi < found.chi_square + 4.0]
-    if near:
-        others = "another set of values fits" if len(near) == 1 else f"{len(near)} other sets of values fit"
-        yield f"there is more than one minimum: {others} about as well"
+    alone = fit(residuals, started, 4, found.loss, polish=False, resolution=RESOLUTION, step=STEP)
+    errors = alone.standard_errors()
+    if errors is None:
+        return held
+    parameter = next(p for p in found.parameters if p.name == held.key)
+    place = parameter.inner(alone.values[held.key])
+    near = min(place - parameter.inner(parameter.low), parameter.inner(parameter.high) - place)
+    if math.isfinite(near) and near <= 1e-4 * parameter.width:
+        return held
+    return replace(held, alone=alone.values[held.key], alone_stderr=errors[held.key])

@@ -3,38 +3,63 @@
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, TypeAlias
 
-from tdacoustic.fitting.least_squares import Fit, Residuals, fit
+from tdacoustic.fitting.least_squares import fit
+from tdacoustic.fitting.loss import Residuals
+from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
 
-__all__ = ["ProfileInterval", "profile_intervals"]
+__all__ = ["ProfileInterval", "profile_intervals", "quantile_of"]
 
-Z_95: Final = 1.959963984540054
 _STEPS: Final = 40
-_CLOSE: Final = 1e-3
+_CLOSE: Final = 2e-3
 
-ProfileInterval = tuple[float | None, float | None]
+ProfileInterval: TypeAlias = tuple[float | None, float | None]
 """Lower and upper end; None where the bound comes before the end of the interval."""
 
 
-def profile_intervals(residuals: Residuals, found: Fit, z: float = Z_95) -> dict[str, ProfileInterval]:
+def quantile_of(level: float, freedom: float | None = None) -> float:
+    """Return how many standard errors an interval reaches to each side.
+
+    Parameters
+    ----------
+    level : float
+        Between 0 and 1.
+    freedom : float, optional
+        Degrees of freedom from which the scatter was taken (Student's t). Default: it is known.
+
+    Examples
+    --------
+    >>> round(quantile_of(0.95), 3), round(quantile_of(0.95, 4), 3)
+    (1.96, 2.776)
+    """
+    from scipy.stats import norm, t
+
+    place = 0.5 * (1.0 + level)
+    return float(norm.ppf(place) if freedom is None else t.ppf(place, freedom))
+
+
+def profile_intervals(
+    residuals: Residuals, found: Fit, level: float = 0.95, freedom: float | None = None
+) -> dict[str, ProfileInterval]:
     """Return the profile-likelihood interval of each moved parameter, in its own unit.
 
-    An end is where the chi square, minimised over the other parameters, has risen by z² (times the misfit's variance
-    where the data's standard deviations are not known). Unlike a standard error it is right where the model bends and
-    where a bound is near.
+    An end is where the chi square, minimised over the other parameters, has risen by the square of the quantile (times
+    the misfit's variance where the data's standard deviations are not known). Unlike a standard error it is right where
+    the model bends and where a bound is near.
 
     Parameters
     ----------
     residuals : callable
         Those of the fit.
     found : Fit
-    z : float
-        1.96 of an interval of 95 %.
+    level : float
+    freedom : float, optional
+        See `quantile_of`.
     """
     scale = 1.0 if found.known_sigma or found.n_free < 1 else found.chi_square / found.n_free
-    rise = z**2 * scale
+    rise = quantile_of(level, freedom) ** 2 * scale
     errors = found.inner_errors()
     return {
         parameter.name: (
@@ -62,12 +87,16 @@ def _end(
 
     def above(place: float) -> float:
         """Zero at the end of the interval, and close to a straight line towards it."""
+        if place == best:
+            return -math.sqrt(rise)
         risen = _profile(residuals, found, parameter, place) - found.chi_square
         return math.sqrt(max(risen, 0.0)) - math.sqrt(rise)
 
     inside, outside = best, best + direction * step
     for _ in range(_STEPS):
         outside = min(outside, limit) if direction > 0.0 else max(outside, limit)
+        if outside == inside:
+            return None
         if above(outside) >= 0.0:
             end = brentq(above, inside, outside, xtol=_CLOSE * abs(outside - best), maxiter=_STEPS)
             return parameter.outer(float(end))
@@ -80,9 +109,9 @@ def _end(
 def _profile(residuals: Residuals, found: Fit, held: FreeParameter, place: float) -> float:
     """Chi square minimised over all parameters but one, with its prior's part for the place it is held at."""
     value = held.outer(place)
-    others = [p.starting_at(found.values[p.name]) for p in found.parameters if p.name != held.name]
+    others = [
+        p.fixed_at(value) if p.name == held.name else p.starting_at(found.values[p.name]) for p in found.parameters
+    ]
     of_prior = 0.0 if held.prior is None else ((place - held.prior[0]) / held.prior[1]) ** 2
-    again = fit(
-        lambda values: residuals({**values, held.name: value}), others, known_sigma=found.known_sigma, polish=False
-    )
+    again = fit(residuals, others, loss=found.loss, known_sigma=found.known_sigma, polish=False)
     return again.chi_square + of_prior

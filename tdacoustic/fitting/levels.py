@@ -3,26 +3,49 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver
+from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver, SoundSource
 from tdacoustic.errors import FittingError
+from tdacoustic.fitting.parameters import FreeParameter
+from tdacoustic.fitting.response import Response, response_of
 from tdacoustic.fleet import Fleet
+from tdacoustic.radiation import overall_level_db
 
-__all__ = ["SILENCE_DB", "LevelModel", "MeasuredLevel"]
+__all__ = ["OFFSET", "SILENCE_DB", "LevelModel", "MeasuredLevel", "offset_name"]
 
-DYNAMIC = ("train.", "gear_pair.", "gear_dynamics.", "operation.", "model.gear_pair")
-"""Parameters that change the motion of the gears; of others only the sound is computed anew."""
+Real = NDArray[np.float64]
 
-SILENCE_DB = -200.0
+DYNAMIC: Final = ("train.", "gear_pair.", "gear_dynamics.", "operation.")
+"""Parameters that change the motion of the gears."""
+
+OF_MOTOR: Final = ("motor.",)
+"""Parameters that change nothing at the gears but what the motor radiates."""
+
+OF_GEARS: Final = ("gear_dynamics.", "masuda.")
+"""Parameters that change nothing of the motor."""
+
+GAINS: Final[Mapping[str, str]] = {"masuda.constant_db": "gears", "model.motor_gain_db": "motor"}
+"""Parameters that add to the level of a path as they stand: nothing is computed anew for them."""
+
+OFFSET: Final = "level_offset_db"
+SILENCE_DB: Final = -200.0
 
 Motion: TypeAlias = tuple[float, float]
 """Peak-to-peak transmission error and static compression in m: all that the meshing noise depends on."""
+
+Values: TypeAlias = Mapping[str, float]
+Key: TypeAlias = tuple[tuple[str, float], ...]
+
+
+def offset_name(campaign: str) -> str:
+    """Return the name of the parameter that adds to all levels of a campaign."""
+    return f"{OFFSET}[{campaign}]"
 
 
 @dataclass(frozen=True)
@@ -40,6 +63,19 @@ class MeasuredLevel:
     origin : {"measured", "synthetic", "printed"}
     source : str
         Where it comes from, in words.
+    what : str
+        ``"overall"``, or the part of the sound it is of, in words: ``"1/3 octave 1000 Hz"``.
+    band_hz : (float, float), optional
+        Only lines of the model in this band count.
+    group : str
+        Condition of the campaign that it is left out with. Default: the condition's name.
+    campaign : str
+        Where several are fitted together.
+
+    Raises
+    ------
+    FittingError
+        A level that is no number, or a standard deviation that is not above zero.
     """
 
     condition: Condition
@@ -49,6 +85,10 @@ class MeasuredLevel:
     weighting: Literal["Z", "A"]
     origin: str
     source: str
+    what: str = "overall"
+    band_hz: tuple[float, float] | None = None
+    group: str = ""
+    campaign: str = ""
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.sigma_db) and self.sigma_db > 0.0):
@@ -57,13 +97,32 @@ class MeasuredLevel:
             )
         if not math.isfinite(self.level_db):
             raise FittingError(f"condition {self.condition.name}: the level must be a number, got {self.level_db!r}")
+        object.__setattr__(self, "group", self.group or self.condition.name)
+
+    @property
+    def place(self) -> tuple[object, ...]:
+        """What the model needs to know of it."""
+        return self.condition, self.receiver, self.weighting, self.band_hz, self.campaign
+
+    def hears(self, frequency_hz: float) -> bool:
+        """Whether a line of this frequency is part of it."""
+        return self.band_hz is None or self.band_hz[0] <= frequency_hz < self.band_hz[1]
+
+
+@dataclass
+class _Computed:
+    """What is known already, shared by models of other levels at the same places."""
+
+    motions: dict[Key, tuple[GearUnit, tuple[Motion, ...]]] = field(default_factory=dict)
+    parts: dict[tuple[str, Key], Real] = field(default_factory=dict)
+    responses: dict[tuple[FreeParameter, ...], Response | None] = field(default_factory=dict)
 
 
 class LevelModel:
     """The levels of a fleet's model at measured places, as a function of some of its parameters.
 
     What the gears do is kept for parameters that it was computed for, so that those which only change the sound cost
-    nothing.
+    nothing. `prepare` interpolates over one or two parameters of the gears.
 
     Parameters
     ----------
@@ -74,47 +133,131 @@ class LevelModel:
     def __init__(self, fleet: Fleet, data: Sequence[MeasuredLevel]) -> None:
         self.fleet = fleet
         self.data = tuple(data)
-        self.conditions = tuple({d.condition.name: d.condition for d in data}.values())
-        self._receivers = {
-            name: tuple({d.receiver.name: d.receiver for d in data if d.condition.name == name}.values())
-            for name in (condition.name for condition in self.conditions)
-        }
-        self._motions: dict[tuple[tuple[str, float], ...], tuple[GearUnit, tuple[Motion, ...]]] = {}
+        self.conditions = tuple(dict.fromkeys(datum.condition for datum in data))
+        self._places = tuple(datum.place for datum in data)
+        self._computed = _Computed()
+        self._response: Response | None = None
+        self._gains = {key: float(fleet.get(key).value) for key in GAINS}
 
-    def sounds(self, values: Mapping[str, float]) -> tuple[DriveSound, ...]:
+    def with_data(self, data: Sequence[MeasuredLevel]) -> LevelModel:
+        """Return the model of other levels at the same places; everything computed is shared.
+
+        Raises
+        ------
+        FittingError
+            The places are others.
+        """
+        if tuple(datum.place for datum in data) != self._places:
+            raise FittingError("levels of other conditions or receivers need a model of their own")
+        made = LevelModel(self.fleet, data)
+        made._computed, made._response = self._computed, self._response
+        return made
+
+    def levels_db(self, values: Values, exact: bool = False) -> Real:
+        """Return the total level for each datum, shape (n,); silence is -200 dB.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            By key of the fleet; a `level_offset_db` of a campaign; other names without a dot are not looked at.
+        exact : bool
+            Whether the gears are to be computed where `prepare` would interpolate.
+        """
+        of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
+        gain = {part: values.get(key, self._gains[key]) - self._gains[key] for key, part in GAINS.items()}
+        motor, gears = self._part("motor", of_fleet), self._gears_db(of_fleet, exact)
+        total = 10.0 * np.log10(10.0 ** (0.1 * (motor + gain["motor"])) + 10.0 ** (0.1 * (gears + gain["gears"])))
+        if len(of_fleet) < len(values):
+            total = total + np.array([values.get(offset_name(datum.campaign), 0.0) for datum in self.data])
+        return np.where(np.maximum(motor, gears) <= SILENCE_DB, SILENCE_DB, total)
+
+    def sounds(self, values: Values) -> tuple[DriveSound, ...]:
         """Return the drive's sound in each condition, with all contributions, for values of parameters by key."""
-        fleet = self.fleet.replaced(values) if values else self.fleet
+        fleet = self._fleet(values)
         unit, motions = self._motion(fleet, values)
         model = DriveModel(fleet, unit)
         return tuple(
-            model.sound(condition, model.masuda_db(condition, *motion), self._receivers[condition.name])
+            model.sound(condition, model.masuda_db(condition, *motion), self._receivers(condition))
             for condition, motion in zip(self.conditions, motions, strict=True)
         )
 
-    def levels_db(self, values: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return the total level for each datum, shape (n,); silence is -200 dB."""
-        sounds = {sound.condition: sound for sound in self.sounds(values)}
-        found = [sounds[d.condition.name].level_db(d.receiver.name, "total", d.weighting) for d in self.data]
-        return np.array([SILENCE_DB if level is None else level for level in found])
+    def prepare(self, free: Sequence[FreeParameter]) -> float | None:
+        """Interpolate over the parameters of the gears among those that a fit moves, where there are one or two.
 
-    def _motion(self, fleet: Fleet, values: Mapping[str, float]) -> tuple[GearUnit, tuple[Motion, ...]]:
+        Parameters
+        ----------
+        free : sequence of FreeParameter
+
+        Returns
+        -------
+        float or None
+            Largest difference at checked places in dB; None where nothing is interpolated.
+        """
+        of_gears = tuple(p for p in free if "." in p.name and p.name not in GAINS and not p.name.startswith(OF_MOTOR))
+        of_gears = tuple(p for p in of_gears if not p.name.startswith(("model.", OFFSET)))
+        bounded = all(p.is_moved and math.isfinite(p.inner(p.low)) and math.isfinite(p.inner(p.high)) for p in of_gears)
+        self._response = None
+        if not bounded or not 1 <= len(of_gears) <= 2:
+            return None
+        plain = tuple(replace(p, initial=p.low, prior=None) for p in of_gears)
+        known = self._computed.responses
+        if plain not in known:
+            known[plain] = response_of(lambda values: self._part("gears", values), plain)
+        self._response = known[plain]
+        return None if self._response is None else self._response.error_db
+
+    def _gears_db(self, values: Values, exact: bool) -> Real:
+        if self._response is not None and not exact:
+            found = self._response(values)
+            if found is not None:
+                return found
+        return self._part("gears", values)
+
+    def _part(self, part: Literal["motor", "gears"], values: Values) -> Real:
+        """Return the level of the motor, or of the gears' paths, for each datum, with the fleet's own gains."""
+        others = ("model.", *(OF_GEARS if part == "motor" else OF_MOTOR))
+        kept = {name: value for name, value in values.items() if name not in GAINS and not name.startswith(others)}
+        key = (part, tuple(sorted(kept.items())))
+        found = self._computed.parts.get(key)
+        if found is None:
+            found = self._computed.parts[key] = self._heard(part, kept)
+            found.flags.writeable = False
+        return found
+
+    def _heard(self, part: Literal["motor", "gears"], values: Values) -> Real:
+        fleet = self._fleet(values)
+        if part == "motor" and not any(name.startswith(DYNAMIC) for name in values):
+            model = DriveModel(fleet, self._motion(self.fleet, {})[0])
+            sources = {condition: model.motor_sources(condition) for condition in self.conditions}
+        else:
+            unit, motions = self._motion(fleet, values)
+            model = DriveModel(fleet, unit)
+            of: Callable[[Condition, Motion], tuple[SoundSource, ...]] = (
+                (lambda condition, motion: model.motor_sources(condition))
+                if part == "motor"
+                else lambda condition, motion: model.gear_sources(condition, model.masuda_db(condition, *motion))
+            )
+            sources = {c: of(c, motion) for c, motion in zip(self.conditions, motions, strict=True)}
+        return np.array([_level_db(model, sources[datum.condition], datum) for datum in self.data])
+
+    def _fleet(self, values: Values) -> Fleet:
+        of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
+        return self.fleet.replaced(of_fleet) if of_fleet else self.fleet
+
+    def _receivers(self, condition: Condition) -> tuple[Receiver, ...]:
+        return tuple(dict.fromkeys(datum.receiver for datum in self.data if datum.condition == condition))
+
+    def _motion(self, fleet: Fleet, values: Values) -> tuple[GearUnit, tuple[Motion, ...]]:
         key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(DYNAMIC)))
-        if key not in self._motions:
+        known = self._computed.motions
+        if key not in known:
             model = DriveModel(fleet)
             states = [model.motion(condition) for condition in self.conditions]
-            motions = tuple((state.dte_pp_m, state.static_compression_m) for state in states)
-            self._motions[key] = (model.unit, motions)
-        return self._motions[key]
-
-    def without(self, condition: str) -> LevelModel:
-        """Return the model of the data of all other conditions; what is known of the gears goes along."""
-        left = LevelModel(self.fleet, _others(self.data, condition))
-        kept = [index for index, held in enumerate(self.conditions) if held.name != condition]
-        left._motions = {
-            key: (unit, tuple(states[index] for index in kept)) for key, (unit, states) in self._motions.items()
-        }
-        return left
+            known[key] = (model.unit, tuple((state.dte_pp_m, state.static_compression_m) for state in states))
+        return known[key]
 
 
-def _others(data: Iterable[MeasuredLevel], condition: str) -> list[MeasuredLevel]:
-    return [datum for datum in data if datum.condition.name != condition]
+def _level_db(model: DriveModel, sources: Sequence[SoundSource], datum: MeasuredLevel) -> float:
+    heard = [source for source in sources if source.path in model.field.adds and datum.hears(source.frequency_hz)]
+    level = overall_level_db(model.field.received_db(heard, datum.receiver, datum.weighting))
+    return SILENCE_DB if level is None else level

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Literal
 
 from tdacoustic.errors import FittingError
@@ -34,6 +35,8 @@ class FreeParameter:
         On which the parameter is moved and its interval is symmetric.
     expression : str, optional
         Instead of moving it: lmfit's expression of other parameters, by their names.
+    fixed : bool
+        Whether it stays where it is, for expressions and profiles.
 
     Raises
     ------
@@ -48,6 +51,7 @@ class FreeParameter:
     prior: tuple[float, float] | None = None
     scale: Literal["linear", "log"] = "linear"
     expression: str | None = None
+    fixed: bool = False
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.initial):
@@ -68,12 +72,21 @@ class FreeParameter:
 
     @property
     def is_moved(self) -> bool:
-        """Whether the fit moves it, rather than an expression."""
-        return self.expression is None
+        """Whether the fit moves it."""
+        return self.expression is None and not self.fixed
+
+    @property
+    def width(self) -> float:
+        """Distance of the bounds on the scale of the fit."""
+        return self.inner(self.high) - self.inner(self.low)
 
     def starting_at(self, value: float) -> FreeParameter:
         """Return the parameter with another initial value, brought into its bounds."""
         return replace(self, initial=min(max(value, self.low), self.high))
+
+    def fixed_at(self, value: float) -> FreeParameter:
+        """Return the parameter as one that stays at a value, brought into its bounds, without its prior."""
+        return replace(self.starting_at(value), fixed=True, prior=None)
 
     def inner(self, value: float) -> float:
         """Value on the scale of the fit."""
@@ -86,6 +99,7 @@ class FreeParameter:
         return inner if self.scale == "linear" else math.exp(inner)
 
 
+@lru_cache(maxsize=1024)
 def _symbol(name: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]", "__", name)
 
@@ -122,9 +136,8 @@ def lmfit_parameters(parameters: Sequence[FreeParameter], inner: Mapping[str, fl
     made: Any = lmfit.Parameters()
     for parameter in parameters:
         value = (inner or {}).get(parameter.name, parameter.inner(parameter.initial))
-        made.add(
-            _symbol(parameter.name), value, min=parameter.inner(parameter.low), max=parameter.inner(parameter.high)
-        )
+        low, high = parameter.inner(parameter.low), parameter.inner(parameter.high)
+        made.add(_symbol(parameter.name), value, vary=not parameter.fixed, min=low, max=high)
     for parameter in parameters:
         if parameter.expression is not None:
             try:

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from tdacoustic.errors import FleetError
+from tdacoustic.fleet.entries import entry_at, split_entry, with_entry
 from tdacoustic.fleet.gear_dynamics import GearDynamics
 from tdacoustic.fleet.gear_pair import GearPair
 from tdacoustic.fleet.housing import Housing
@@ -180,6 +181,25 @@ class Fleet:
         assert isinstance(found, Parameter)
         return found
 
+    def value_of(self, key: str) -> Any:
+        """Return the value of a parameter, or of an entry of one, in the unit that its key names.
+
+        Parameters
+        ----------
+        key : str
+            As for `get`, or with the number of an entry after it: ``"gear_dynamics.mass_kg.2"``.
+
+        Raises
+        ------
+        FleetError
+            As `get`; or there is no such entry.
+        """
+        whole, place = split_entry(key)
+        value = entry_at(self.get(whole).value, place)
+        if value is None:
+            raise FleetError(f"{self.path}: {key}: {whole} has no such entry")
+        return value
+
     def number(self, key: str) -> float:
         """Return a parameter in SI units.
 
@@ -217,7 +237,9 @@ class Fleet:
         Parameters
         ----------
         values : mapping of str to object
-            By dotted key, in the unit that the key names. A key whose file leaves it out is added.
+            By dotted key, in the unit that the key names. A key whose file leaves it out is added. With a number after
+            it, as in ``"gear_dynamics.mass_kg.2"``, one entry is replaced, and its standard deviation stands in the
+            origin of the whole.
         stderr : mapping of str to float, optional
             One standard deviation of some of them.
         origin : str
@@ -233,13 +255,38 @@ class Fleet:
         if foreign:
             raise FleetError(f"{self.path}: stderr of {', '.join(foreign)}, which is not replaced")
         raw: dict[str, Any] = {name: _raw(getattr(self, name)) for name in SECTIONS if getattr(self, name) is not None}
+        entries = {key: split_entry(key) for key in values}
         for key, value in values.items():
-            problem = key_problem(key)
+            whole, place = entries[key]
+            problem = key_problem(whole)
             if problem is not None:
                 raise FleetError(f"{self.path}: {problem}")
-            self._set(raw, key, {"value": frozen(value), "origin": origin, "stderr": deviations.get(key)})
+            if not place:
+                self._set(raw, key, {"value": frozen(value), "origin": origin, "stderr": deviations.get(key)})
+        for whole in dict.fromkeys(whole for whole, place in entries.values() if place):
+            changes = {key: place for key, (of, place) in entries.items() if of == whole and place}
+            self._set(raw, whole, self._with_entries(whole, changes, values, deviations, origin))
         changed = Fleet.of_tables(self.path, {"name": self.name, **raw})
         return replace(changed, meta=self.meta)
+
+    def _with_entries(
+        self,
+        whole: str,
+        changes: Mapping[str, tuple[int, ...]],
+        values: Mapping[str, Any],
+        deviations: Mapping[str, float],
+        origin: str,
+    ) -> dict[str, Any]:
+        """A parameter with some of its entries replaced, as a file would have it."""
+        held = self.get(whole)
+        value = held.value
+        told = []
+        for key, place in changes.items():
+            self.value_of(key)
+            value = with_entry(value, place, frozen(values[key]))
+            number = ".".join(str(index + 1) for index in place)
+            told.append(f"entry {number} {origin}" + (f" ± {deviations[key]:.3g}" if key in deviations else ""))
+        return {"value": value, "origin": "; ".join([held.origin, *told]), "stderr": None}
 
     def _set(self, raw: dict[str, Any], key: str, parameter: dict[str, Any]) -> None:
         *tables, last = key.split(".")

@@ -18,11 +18,13 @@ class Model(Table):
     gear_path : Parameter of str
         ``"masuda"``, ``"structure"`` (bearing forces through the housing) or ``"sum"`` (the paper, which counts the
         gear twice).
-    structure_gain_db : Parameter of float
+    structure_gain_db, motor_gain_db : Parameter of float
+        Added to the structure's level, and to the sound power level of each of the motor's lines.
     gear_pair : str or None
         Name of the pair that the gear model computes. Default: the first.
     """
 
     gear_path: Parameter[Literal["masuda", "structure", "sum"]] = default("masuda")
     structure_gain_db: Parameter[float] = default(0.0)
+    motor_gain_db: Parameter[float] = default(0.0)
     gear_pair: Name | None = None

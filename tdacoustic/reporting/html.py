@@ -45,7 +45,7 @@ from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
 
 __all__ = ["MAX_FIGURE_BYTES", "MAX_INTERACTIVE", "csv_cell", "render_html", "safe_json"]
 
-MAX_INTERACTIVE: Final = 60
+MAX_INTERACTIVE: Final = 100
 """Figures of a page that can be zoomed; later ones are still pictures."""
 MAX_FIGURE_BYTES: Final = 12_000_000
 """Data of all figures of a page that can be zoomed."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tdacoustic import __version__
-from tdacoustic.reporting.document import Document, Notice
+from tdacoustic.reporting.document import Document, Fact, Notice, Section
 from tdacoustic.reporting.sections.answer import answer
 from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.levels import levels
@@ -16,7 +16,9 @@ from tdacoustic.reporting.sections.spectra import spectra
 from tdacoustic.reporting.sections.speed import speed
 from tdacoustic.results import Analysis
 
-__all__ = ["measured_report"]
+__all__ = ["MEASURED_FOOTER", "measured_facts", "measured_report", "measured_sections"]
+
+MEASURED_FOOTER = ("Levels of sound pressure re 20 µPa, of acceleration re 1 µm/s².",)
 
 
 def measured_report(analysis: Analysis) -> Document:
@@ -31,30 +33,46 @@ def measured_report(analysis: Analysis) -> Document:
     if campaign.origin == "synthetic":
         text = "Every number of this report comes from signals made by a program. Nothing in it was measured."
         notices.append(Notice("synthetic", text))
-    found = (side_by_side(analysis), sources(analysis), kinematics(analysis))
-    beside = found[0] is not None
-    sections = [section for section in found if section is not None]
-    sections += [measured(analysis), quality(analysis)]
-    if len(analysis.tables["levels"]):
-        sections.append(levels(analysis))
-    if any(run.measurement is not None for run in analysis.runs):
-        sections.append(spectra(analysis, fold=beside))
-    sections += [section for section in (speed(analysis), provenance(analysis)) if section is not None]
-    n_runs = sum(run.measurement is not None for run in analysis.runs)
     return Document(
         title=campaign.name,
         subtitle="Noise and vibration of a traction drive: what the recordings show",
         origin=campaign.origin,
         summary=answer(analysis),
         notices=notices,
-        sections=sections,
-        facts=[
-            ("Conditions", ", ".join(campaign.conditions()) or "none"),
-            ("Runs analysed", f"{n_runs} of {len(analysis.runs)}"),
-            ("Channels", str(len(campaign.channels))),
-        ],
-        footer=[
-            f"Made with tdacoustic {__version__}.",
-            "Levels of sound pressure re 20 µPa, of acceleration re 1 µm/s².",
-        ],
+        sections=[*measured_sections(analysis), provenance(analysis)],
+        facts=measured_facts(analysis),
+        footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER],
     )
+
+
+def measured_facts(analysis: Analysis) -> list[Fact]:
+    """Return what stands below the title: how much was analysed.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    campaign = analysis.campaign
+    n_runs = sum(run.measurement is not None for run in analysis.runs)
+    return [
+        Fact("Conditions", ", ".join(campaign.conditions()) or "none"),
+        Fact("Runs analysed", f"{n_runs} of {len(analysis.runs)}"),
+        Fact("Channels", str(len(campaign.channels))),
+    ]
+
+
+def measured_sections(analysis: Analysis) -> list[Section]:
+    """Return the sections on the recordings; not that on provenance.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    """
+    beside = side_by_side(analysis)
+    found = [beside, sources(analysis), kinematics(analysis), measured(analysis), quality(analysis)]
+    if len(analysis.tables["levels"]):
+        found.append(levels(analysis))
+    if any(run.measurement is not None for run in analysis.runs):
+        found.append(spectra(analysis, fold=beside is not None))
+    found.append(speed(analysis))
+    return [section for section in found if section is not None]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tdacoustic import __version__
-from tdacoustic.reporting.document import Document
+from tdacoustic.reporting.document import Document, Section
 from tdacoustic.reporting.sections.bearing_loads import bearing_loads
 from tdacoustic.reporting.sections.gear_answer import gear_answer
 from tdacoustic.reporting.sections.gear_method import gear_method
@@ -18,7 +18,12 @@ from tdacoustic.reporting.sections.speed_sweep import speed_sweep
 from tdacoustic.reporting.sections.transmission_error import transmission_error
 from tdacoustic.results import FleetPrediction
 
-__all__ = ["predicted_report"]
+__all__ = ["PREDICTED_FOOTER", "predicted_report", "predicted_sections"]
+
+PREDICTED_FOOTER = (
+    "Forces are peak amplitudes, displacements peak to peak where so named.",
+    f"The paper, and its figures, tables and equations, are those of {PAPER}.",
+)
 
 
 def predicted_report(result: FleetPrediction) -> Document:
@@ -29,6 +34,29 @@ def predicted_report(result: FleetPrediction) -> Document:
     result : FleetPrediction
     """
     prediction = result.prediction
+    speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
+    return Document(
+        title=result.fleet.name,
+        subtitle="Noise and vibration of a traction drive: what the rapid model gives",
+        origin="calculated",
+        summary=gear_answer(result),
+        sections=[*predicted_sections(result), gear_method(result)],
+        facts=[
+            ("Conditions", ", ".join(state.condition.name for state in prediction.conditions)),
+            ("Train speeds", " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds))))),
+            ("Teeth", " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
+        ],
+        footer=[f"Made with tdacoustic {__version__}.", "Levels re 20 µPa.", *PREDICTED_FOOTER],
+    )
+
+
+def predicted_sections(result: FleetPrediction) -> list[Section]:
+    """Return the sections on the model, its parameters last; not those on method and provenance.
+
+    Parameters
+    ----------
+    result : FleetPrediction
+    """
     found = [
         gear_pair,
         mesh_stiffness,
@@ -38,23 +66,6 @@ def predicted_report(result: FleetPrediction) -> Document:
         meshing_noise,
         sound_field,
         helix_sweep,
+        model_parameters,
     ]
-    sections = [section for section in (make(result) for make in found) if section is not None]
-    speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
-    return Document(
-        title=result.fleet.name,
-        subtitle="Noise and vibration of a traction drive: what the rapid model gives",
-        origin="calculated",
-        summary=gear_answer(result),
-        sections=[*sections, model_parameters(result), gear_method(result)],
-        facts=[
-            ("Conditions", ", ".join(state.condition.name for state in prediction.conditions)),
-            ("Train speeds", " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds))))),
-            ("Teeth", " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
-        ],
-        footer=[
-            f"Made with tdacoustic {__version__}.",
-            "Levels re 20 µPa. Forces are peak amplitudes, displacements peak to peak where so named.",
-            f"The paper, and its figures, tables and equations, are those of {PAPER}.",
-        ],
-    )
+    return [section for section in (make(result) for make in found) if section is not None]

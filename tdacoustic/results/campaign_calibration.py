@@ -10,7 +10,25 @@ from tdacoustic.fleet import Fleet
 from tdacoustic.results.analysis import Analysis, LogInput
 from tdacoustic.steps.record import versions
 
-__all__ = ["CampaignCalibration"]
+__all__ = ["CampaignCalibration", "SpeedLevel"]
+
+
+@dataclass(frozen=True)
+class SpeedLevel:
+    """The model's level on the 4 m surface in one condition, before and after the calibration.
+
+    Parameters
+    ----------
+    condition : str
+    train_speed_km_h : float
+    before_db, after_db : float
+        NaN of a silent model.
+    """
+
+    condition: str
+    train_speed_km_h: float
+    before_db: float
+    after_db: float
 
 
 @dataclass(frozen=True)
@@ -27,6 +45,8 @@ class CampaignCalibration:
     calibration : Calibration
     inputs : tuple of LogInput
         Every file that went in.
+    over_speed : tuple of SpeedLevel
+        Of the campaign's conditions and of those of ``[operation]`` that it does not have, by speed.
     """
 
     campaign: Campaign
@@ -34,6 +54,7 @@ class CampaignCalibration:
     analysis: Analysis | None
     calibration: Calibration
     inputs: tuple[LogInput, ...]
+    over_speed: tuple[SpeedLevel, ...] = ()
 
     @property
     def versions(self) -> dict[str, str]:

@@ -9,9 +9,16 @@ import numpy as np
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["SCHEMA", "group_of", "put"]
+__all__ = ["SCHEMA", "describe", "group_of", "put"]
 
 SCHEMA = "tdacoustic-result-file/1"
+
+
+def describe(file: h5py.File, name: str, origin: str) -> None:
+    """Write what a file is: its schema, and name and origin of its campaign or fleet."""
+    file.attrs["schema"] = SCHEMA
+    file.attrs["name"] = name
+    file.attrs["origin"] = origin
 
 
 def group_of(parent: h5py.Group, name: str) -> h5py.Group:

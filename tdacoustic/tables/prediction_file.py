@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,17 +10,35 @@ import numpy as np
 
 from tdacoustic.drive import GearState, Prediction
 from tdacoustic.gears import DIRECTIONS, GEARS, sampling_points
-from tdacoustic.tables.hdf5_groups import SCHEMA, group_of, put
+from tdacoustic.tables.hdf5_groups import describe, group_of, put
 
 if TYPE_CHECKING:
     import h5py
 
-__all__ = ["write_prediction_file"]
+__all__ = ["ModelArrays", "write_model", "write_prediction_file"]
 
 STIFFNESS_SAMPLES = 512
 
 
-def write_prediction_file(path: Path, name: str, prediction: Prediction, highest_hz: float) -> None:
+@dataclass(frozen=True)
+class ModelArrays:
+    """A prediction as it goes into a file.
+
+    Parameters
+    ----------
+    name : str
+        Of the fleet.
+    prediction : Prediction
+    highest_hz : float
+        Up to which the spectrum of the bearing forces is sampled.
+    """
+
+    name: str
+    prediction: Prediction
+    highest_hz: float
+
+
+def write_prediction_file(path: Path, model: ModelArrays) -> None:
     """Write the arrays of a prediction.
 
     Layout: ``/model/mesh/`` with ``time_mesh_periods``, ``stiffness``, ``transmission_error``, and for each condition
@@ -31,29 +50,37 @@ def write_prediction_file(path: Path, name: str, prediction: Prediction, highest
     Parameters
     ----------
     path : Path
-    name : str
-        Of the fleet.
-    prediction : Prediction
-    highest_hz : float
-        Up to which the spectrum is sampled.
+    model : ModelArrays
     """
     import h5py
 
     with h5py.File(path, "w") as file:
-        file.attrs["schema"] = SCHEMA
-        file.attrs["name"] = name
-        file.attrs["origin"] = "calculated"
-        model = file.create_group("model")
-        model.attrs["gears"] = list(GEARS)
-        model.attrs["directions"] = list(DIRECTIONS)
-        mesh, system = model.create_group("mesh"), prediction.unit.system
-        time = np.arange(STIFFNESS_SAMPLES) / STIFFNESS_SAMPLES
-        put(mesh, "time_mesh_periods", time, "1")
-        put(mesh, "stiffness", system.mesh_stiffness_n_per_m * system.contact_lines.relative(time), "N/m")
-        put(mesh, "transmission_error", system.transmission_error_at(time), "m")
-        conditions = model.create_group("conditions")
-        for state in prediction.conditions:
-            _write_condition(group_of(conditions, state.condition.name), state, highest_hz)
+        describe(file, model.name, "calculated")
+        write_model(file.create_group("model"), model)
+
+
+def write_model(group: h5py.Group, model: ModelArrays) -> None:
+    """Write the arrays of a prediction into a group: what `write_prediction_file` has in ``/model/``.
+
+    Parameters
+    ----------
+    group : h5py.Group
+        Empty.
+    model : ModelArrays
+    """
+    prediction = model.prediction
+    group.attrs["name"] = model.name
+    group.attrs["origin"] = "calculated"
+    group.attrs["gears"] = list(GEARS)
+    group.attrs["directions"] = list(DIRECTIONS)
+    mesh, system = group.create_group("mesh"), prediction.unit.system
+    time = np.arange(STIFFNESS_SAMPLES) / STIFFNESS_SAMPLES
+    put(mesh, "time_mesh_periods", time, "1")
+    put(mesh, "stiffness", system.mesh_stiffness_n_per_m * system.contact_lines.relative(time), "N/m")
+    put(mesh, "transmission_error", system.transmission_error_at(time), "m")
+    conditions = group.create_group("conditions")
+    for state in prediction.conditions:
+        _write_condition(group_of(conditions, state.condition.name), state, model.highest_hz)
 
 
 def _write_condition(group: h5py.Group, state: GearState, highest_hz: float) -> None:

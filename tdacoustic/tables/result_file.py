@@ -1,4 +1,4 @@
-"""``result.h5``: spectra, floors, bands, lines and speeds of all runs, for other programs."""
+"""``result.h5``: spectra, floors, bands, lines and speeds of all runs, and the model's arrays, for other programs."""
 
 from __future__ import annotations
 
@@ -8,22 +8,28 @@ from typing import TYPE_CHECKING
 
 from tdacoustic.measured.results import ChannelResult, RunMeasurement
 from tdacoustic.measured.runs import MeasuredRun
-from tdacoustic.tables.hdf5_groups import SCHEMA, group_of, put
+from tdacoustic.tables.hdf5_groups import describe, group_of, put
+from tdacoustic.tables.prediction_file import ModelArrays, write_model
 
 if TYPE_CHECKING:
     import h5py
 
 __all__ = ["write_result_file"]
 
+PREDICTION = "prediction"
 
-def write_result_file(path: Path, name: str, origin: str, runs: Sequence[MeasuredRun]) -> None:
-    """Write the arrays of all runs.
+
+def write_result_file(
+    path: Path, name: str, origin: str, runs: Sequence[MeasuredRun], model: ModelArrays | None = None
+) -> None:
+    """Write the arrays of all runs, and those of the model where it was computed.
 
     Layout: ``/<run>/speed/<channel>`` (time, speed), ``/<run>/channels/<channel>/``
     with ``frequency_hz``, ``density`` (mean square per Hz), ``floor_density``,
     ``line_frequency_hz``, ``line_rms``, ``band_hz``, ``band_mean_square``, and for a
     run-up ``map_time_s``, ``map_frequency_hz``, ``map_density``. A ``/`` in a name becomes ``_``,
-    with more of them where that name is taken; the attribute ``name`` holds it as it is.
+    with more of them where that name is taken; the attribute ``name`` holds it as it is. The model's arrays stand in
+    ``/prediction/``, laid out as `tdacoustic.tables.prediction_file.write_prediction_file` has them in ``/model/``.
 
     Parameters
     ----------
@@ -31,13 +37,14 @@ def write_result_file(path: Path, name: str, origin: str, runs: Sequence[Measure
     name, origin : str
         Of the campaign.
     runs : sequence of MeasuredRun
+    model : ModelArrays, optional
     """
     import h5py
 
     with h5py.File(path, "w") as file:
-        file.attrs["schema"] = SCHEMA
-        file.attrs["name"] = name
-        file.attrs["origin"] = origin
+        describe(file, name, origin)
+        if model is not None:  # before the runs, one of which may be called so
+            write_model(file.create_group(PREDICTION), model)
         for run in runs:
             group = group_of(file, run.name)
             group.attrs["condition"] = run.run.condition or ""

@@ -12,7 +12,7 @@ from tdacoustic.toml_models.messages import (
 )
 from tdacoustic.toml_models.names import MAX_NAME_LENGTH, Name, legal_name, name_problem, unique_name
 from tdacoustic.toml_models.reading import check_schema, file_or_inside, frozen, meta_lines, read_toml
-from tdacoustic.toml_models.values import NonNegative, Positive, Table, Text
+from tdacoustic.toml_models.values import NonNegative, Positive, Table, Text, each_once
 
 __all__ = [
     "MAX_LINES",
@@ -25,6 +25,7 @@ __all__ = [
     "Text",
     "Vocabulary",
     "check_schema",
+    "each_once",
     "file_error",
     "file_or_inside",
     "frozen",

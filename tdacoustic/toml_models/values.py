@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-__all__ = ["NonNegative", "Positive", "Table", "Text"]
+__all__ = ["NonNegative", "Positive", "Table", "Text", "each_once"]
 
 
 class Table(BaseModel):
@@ -19,6 +19,14 @@ def _text(value: str) -> str:
     if not value.strip():
         raise ValueError("must not be empty")
     return value
+
+
+def each_once(values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Return values of which none may stand twice; for validators."""
+    twice = next((value for i, value in enumerate(values) if value in values[:i]), None)
+    if twice is not None:
+        raise ValueError(f"names {twice!r} twice")
+    return values
 
 
 Text = Annotated[str, AfterValidator(_text)]

@@ -31,6 +31,8 @@ def analyze(
     store: str | Path | Store | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
+    *,
+    without_runs: bool = False,
 ) -> Analysis:
     """Analyse the logs of a campaign.
 
@@ -42,6 +44,8 @@ def analyze(
     jobs : int, optional
         Processes; default: one a core where the logs are large enough to pay.
     progress : callable, optional
+    without_runs : bool
+        Go on where no run can be used: for who has more to do than to analyse.
 
     Returns
     -------
@@ -52,7 +56,7 @@ def analyze(
     Raises
     ------
     TdacousticError
-        The campaign or its fleet is wrong, or no run can be used.
+        The campaign or its fleet is wrong, or (unless `without_runs`) no run can be used.
     """
     from tdacoustic.steps import execute, lineage, result_of
     from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems, written_inputs
@@ -60,11 +64,12 @@ def analyze(
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     fleet, problems = _fleet(campaign)
-    prepared = prepare_runs(campaign, store)
+    prepared = prepare_runs(campaign, store, without_runs)
     tasks = {item.run.name: item.task for item in prepared if item.task is not None}
     outcome = execute(list(tasks.values()), store, _jobs(prepared) if jobs is None else jobs, progress)
     failures = {name: outcome.failed[task.key] for name, task in tasks.items() if task.key in outcome.failed}
-    _raise_if_all_failed(failures, len(tasks))
+    if not without_runs:
+        _raise_if_all_failed(failures, len(tasks))
     by_name = {item.run.name: item for item in prepared}
     runs = tuple(gather_run(run, by_name.get(run.name), failures, store) for run in campaign.runs)
     evidence: dict[str, RunEvidence] = {}
@@ -107,7 +112,7 @@ def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[
 
     if campaign.runs and not any(run.valid for run in campaign.runs):
         return ["all runs are rejected: nothing is analysed"]
-    if campaign.runs and not receivers(runs):
+    if any(run.recording is not None for run in runs) and not receivers(runs):
         return ["no microphone among the channels: no noise level, no noise lines, no dominance"]
     return []
 

@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
-import json
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Final
 
 from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import CampaignError
 from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
+from tdacoustic.workflows.runs import written_inputs
 
 if TYPE_CHECKING:
-    from tdacoustic.results import CampaignCalibration
+    from tdacoustic.fitting.calibration import Calibration
+    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fleet import Fleet
+    from tdacoustic.results import Analysis, CampaignCalibration, SpeedLevel
 
-__all__ = ["calibrate", "calibration_json"]
+__all__ = ["calibrate"]
 
-SCHEMA = "tdacoustic-calibration/1"
+MOST_OF_THE_SOUND: Final = 0.5
+"""Part of the sound energy that lines carry, below which a model of lines is doubtful beside an overall level."""
 
 
 def calibrate(
@@ -26,8 +31,9 @@ def calibrate(
     store: str | Path | Store | None = None,
     jobs: int | None = None,
     progress: Progress | None = None,
+    analysis: Analysis | None = None,
 ) -> CampaignCalibration:
-    """Fit the parameters that ``[calibration] free`` names to the measured levels of a campaign.
+    """Fit the parameters that ``[calibration]`` names to the measured levels of a campaign.
 
     Parameters
     ----------
@@ -35,85 +41,81 @@ def calibrate(
         With a fleet.
     store, jobs, progress
         As of `tdacoustic.analyze`.
+    analysis : Analysis, optional
+        The campaign's measured side, where it is known already.
 
     Raises
     ------
     TdacousticError
         There is no fleet, nothing to calibrate with, or the fleet cannot be computed.
     """
-    from tdacoustic.fitting.calibration import calibrate_fleet, free_parameter
+    from tdacoustic.fitting.calibration import calibrate_fleet
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
-    from tdacoustic.workflows.analyze import analyze
-    from tdacoustic.workflows.measured_levels import measured_levels
-    from tdacoustic.workflows.runs import written_inputs
+    from tdacoustic.workflows.calibration_setup import candidates_of, fit_settings, free_parameters
+    from tdacoustic.workflows.joint_levels import joint_levels
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     if campaign.fleet is None:
         raise CampaignError(f"{campaign.path}: fleet is missing, and a calibration needs it")
     fleet = load_fleet(campaign.fleet.path)
-    analysis = analyze(campaign, store, jobs, progress) if campaign.runs else None
-    data, doubts = measured_levels(campaign, analysis, fleet)
-    free = [free_parameter(fleet, key) for key in campaign.calibration.free]
+    if analysis is None and campaign.runs:
+        analysis = _analyzed(campaign, store, jobs, progress)
+    joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
+    free, transferred, inputs = free_parameters(campaign, fleet, joint.campaigns)
     if progress is not None:
         progress("calibrating", 0, 1)
-    origin = f"calibrated to {campaign.name}"
-    found = calibrate_fleet(fleet, data, free, campaign.calibration.model_sigma_db, origin)
-    found = replace(found, doubts=(*doubts, *found.doubts))
-    inputs = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
-    return CampaignCalibration(campaign, fleet, analysis, found, inputs)
+    found = calibrate_fleet(
+        fleet,
+        joint.data,
+        free,
+        fit_settings(campaign),
+        f"calibrated to {' and '.join([campaign.name, *joint.campaigns[1:]])}",
+        candidates=candidates_of(campaign, fleet, joint.data),
+        transferred=transferred,
+    )
+    doubts = (*joint.doubts, *_doubts_of_lines(analysis, joint.data), *found.doubts)
+    found = replace(found, doubts=tuple(dict.fromkeys(doubts)))
+    own = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
+    over_speed = _over_speed(fleet, found, joint.data)
+    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *inputs), over_speed)
 
 
-def calibration_json(result: CampaignCalibration) -> str:
-    """Return ``calibration.json``.
-
-    Parameters
-    ----------
-    result : CampaignCalibration
-    """
-    found = result.calibration
-    parameters = {
-        p.key: {
-            "value": p.value,
-            "initial": p.initial,
-            "min": _known(p.low),
-            "max": _known(p.high),
-            "stderr": p.stderr,
-            "ci95": None if p.ci95 is None else list(p.ci95),
-        }
-        for p in found.parameters
-    }
-    residuals = [
-        {
-            "condition": level.datum.condition.name,
-            "receiver": level.datum.receiver.name,
-            "measured_db": level.datum.level_db,
-            "predicted_db": level.predicted_db,
-            "before_db": level.before_db,
-            "sigma_db": level.sigma_db,
-            "weighting": level.datum.weighting,
-            "origin": level.datum.origin,
-        }
-        for level in found.levels
+def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -> list[str]:
+    """Say where the recordings are mostly broadband and the model, which has lines alone, is held against all of it."""
+    if analysis is None or all(datum.what != "overall" for datum in data):
+        return []
+    parts = [verdict.line_fraction for verdict in analysis.dominance if verdict.line_fraction is not None]
+    if not parts or max(parts) >= MOST_OF_THE_SOUND:
+        return []
+    between = " to ".join(dict.fromkeys(f"{100.0 * part:.0f}" for part in (min(parts), max(parts))))
+    return [
+        f"lines carry {between} % of the recorded sound energy, and the model has lines alone: what is fitted to the "
+        "overall levels takes the broadband sound on as well"
     ]
-    document: dict[str, Any] = {
-        "schema": SCHEMA,
-        "campaign": result.campaign.name,
-        "fleet": result.fleet.name,
-        "model_sigma_db": result.campaign.calibration.model_sigma_db,
-        "parameters": parameters,
-        "residuals": residuals,
-        "left_out": [{"condition": left.condition, "error_db": left.error_db} for left in found.left_out],
-        "correlation": None if found.correlation is None else found.correlation.tolist(),
-        "rank": found.rank,
-        "chi_square": found.chi_square,
-        "doubts": list(found.doubts),
-        "inputs": [{"file": file.written, "sha256": file.sha256} for file in result.inputs],
-        "versions": result.versions,
-    }
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _over_speed(fleet: Fleet, found: Calibration, data: Sequence[MeasuredLevel]) -> tuple[SpeedLevel, ...]:
+    """The model's level in the conditions of the data and of the fleet, before and after."""
+    from tdacoustic.drive import DriveModel, conditions_of
+    from tdacoustic.results import SpeedLevel
+
+    conditions = {datum.condition.name: datum.condition for datum in data if datum.group == datum.condition.name}
+    if fleet.operation.train_speed_km_h is not None:
+        conditions = {**{condition.name: condition for condition in conditions_of(fleet)}, **conditions}
+    by_speed = sorted(conditions.values(), key=lambda condition: condition.train_speed_km_h)
+    sides = []
+    for model in (DriveModel(fleet), DriveModel(found.fleet)):
+        sounds = [model.sound(condition, model.gears(condition).masuda_db) for condition in by_speed]
+        sides.append([sound.level_db(model.field.surface.name) for sound in sounds])
+    return tuple(
+        SpeedLevel(condition.name, condition.train_speed_km_h, *(math.nan if x is None else x for x in levels))
+        for condition, *levels in zip(by_speed, *sides, strict=True)
+    )
+
+
+def _analyzed(campaign: Campaign, store: Store, jobs: int | None, progress: Progress | None) -> Analysis:
+    from tdacoustic.workflows.analyze import analyze
+
+    return analyze(campaign, store, jobs, progress)

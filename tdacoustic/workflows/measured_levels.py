@@ -3,37 +3,49 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Final
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Final
 
 from tdacoustic.errors import FittingError
+from tdacoustic.workflows.usable_recordings import NEAR, SURFACE_M, UsableRecordings
 
 if TYPE_CHECKING:
-    from tdacoustic.campaign import Campaign
+    from tdacoustic.campaign import Campaign, CampaignRun
     from tdacoustic.drive import Condition
     from tdacoustic.fitting.levels import MeasuredLevel
     from tdacoustic.fleet import Fleet
     from tdacoustic.results import Analysis
+    from tdacoustic.steps import Store
 
-__all__ = ["measured_levels"]
+__all__ = ["DATA", "campaign_conditions", "measured_levels"]
 
-SURFACE_M: Final = 4.0
-NEAR: Final = 0.05
-"""A receiver whose distance differs by no more from 4 m belongs to the 4 m level; others are not moved there."""
+DATA: Final = ("surface", "receivers", "bands", "orders")
+"""What a model can be held against."""
 
-RECORDING_SIGMA_DB: Final = 0.3
+LEVEL_SIGMA_DB: Final = 0.3
 STATED_SIGMA_DB: Final = 1.0
-"""Standard deviations of a recorded level and of a stated one where nothing says them [assumed]."""
+"""Standard deviations of what instruments leave open and of a stated level where nothing says them [assumed]."""
 
 
 def measured_levels(
-    campaign: Campaign, analysis: Analysis | None, fleet: Fleet
+    campaign: Campaign,
+    analysis: Analysis | None,
+    fleet: Fleet,
+    data: Collection[str] = ("surface",),
+    level_sigma_db: float = LEVEL_SIGMA_DB,
+    store: Store | None = None,
 ) -> tuple[list[MeasuredLevel], list[str]]:
-    """Return the 4 m levels of a campaign, and what could not be used in words.
+    """Return the levels of a campaign that a model can be held against, and what could not be used in words.
 
-    The measured 4 m level of a condition is the energy mean of ``level_db`` (of the whole record, corrected for
-    background where that is recorded) over its runs and over the receivers within 5 % of 4 m; levels of ``[[level]]``
-    are taken as they stand, at their own distance.
+    Levels of ``[[level]]`` are taken as they stand, at their own distance. From recordings come, as `data` asks:
+
+    - ``"surface"``: the 4 m level of a condition, the energy mean of ``level_db`` (of the whole record, corrected for
+      background where that is recorded) over its runs and over the receivers within 5 % of 4 m;
+    - ``"receivers"``: the level at each microphone of role receiver whose place is known, over the condition's runs;
+    - ``"bands"``: the third-octave levels at 4 m, from 20 Hz to the model's upper limit;
+    - ``"orders"``: the level of the modelled pair's mesh order at 4 m over run-ups, each speed a condition of its own.
+
+    Channels that are bad do not enter. Standard deviations: see `tdacoustic.measured.mean_levels`.
 
     Parameters
     ----------
@@ -41,101 +53,173 @@ def measured_levels(
     analysis : Analysis or None
         None of a campaign without runs.
     fleet : Fleet
+    data : collection of str
+        Out of `DATA`.
+    level_sigma_db : float
+        Standard deviation of a recorded level that instruments and their calibration leave open.
+    store : Store, optional
+        In which the analysis was made. Without it no run-up can be used, and nobody asks what a record that was made
+        once shows of its own scatter.
 
     Raises
     ------
     FittingError
-        There is nothing to calibrate with.
+        There is nothing to calibrate with, or `data` asks for what there is not.
+    CampaignError
+        A microphone's place cannot be.
     """
+    unknown = [name for name in data if name not in DATA]
+    if unknown or not data:
+        raise FittingError(f"data must be out of {', '.join(DATA)}, got {', '.join(unknown) or 'nothing'}")
+    conditions, doubts = campaign_conditions(campaign, analysis, fleet)
+    found: list[MeasuredLevel] = []
+    if analysis is not None:
+        usable = UsableRecordings(campaign, analysis, store, level_sigma_db)
+        for levels, problems in _recorded(usable, conditions, fleet, data):
+            found += levels
+            doubts += problems
+        if "surface" in data and not {"receivers", "bands"}.isdisjoint(data):
+            others = " and ".join(name for name in ("receivers", "bands") if name in data)
+            doubts.append(f"the 4 m level and its {others} are of the same recordings, which count more than once")
+    levels, problems = _stated(campaign, conditions)
+    found += levels
+    doubts += problems
+    if not found:
+        said = "; ".join(dict.fromkeys(doubts))
+        raise FittingError(
+            f"{campaign.path}: no level to calibrate with: no receiver within 5 % of 4 m (role, distance_m) in a "
+            f"usable run, and no [[level]] (data: {', '.join(data)}{'; ' + said if said else ''})"
+        )
+    return found, list(dict.fromkeys(doubts))
+
+
+def _recorded(
+    usable: UsableRecordings, conditions: Mapping[str, Condition], fleet: Fleet, data: Collection[str]
+) -> Iterator[tuple[list[MeasuredLevel], list[str]]]:
+    from tdacoustic.workflows.microphones import microphone_doubts, microphones
+    from tdacoustic.workflows.recorded_levels import band_levels, receiver_levels, surface_levels
+    from tdacoustic.workflows.run_up_levels import order_levels
+
+    if "surface" in data:
+        yield surface_levels(usable, conditions)
+    if "receivers" in data:
+        yield receiver_levels(usable, conditions, microphones(usable.campaign, fleet))
+        yield [], list(microphone_doubts(usable.campaign))
+    if "bands" in data:
+        yield band_levels(usable, conditions, fleet.number("radiation.max_frequency_hz"))
+    if "orders" in data:
+        yield order_levels(usable, fleet)
+
+
+def _stated(campaign: Campaign, conditions: Mapping[str, Condition]) -> tuple[list[MeasuredLevel], list[str]]:
+    """Levels of ``[[level]]``."""
     from tdacoustic.drive import Receiver
     from tdacoustic.fitting.levels import MeasuredLevel
 
-    doubts: list[str] = []
-    conditions, problems = _conditions(campaign, analysis, fleet)
-    doubts += problems
-    surface = Receiver(f"{SURFACE_M:g} m", SURFACE_M)
-    data = []
-    for name, level_db, sigma_db in _recorded(campaign, analysis):
-        if name in conditions:
-            data.append(
-                MeasuredLevel(conditions[name], surface, level_db, sigma_db, "Z", campaign.origin, "recordings")
-            )
+    found, doubts = [], []
     for known in campaign.levels:
         if known.weighting == "C":
             doubts.append(f"the C-weighted level of condition {known.condition} is not used")
         elif known.condition in conditions:
             near = abs(known.distance_m - SURFACE_M) <= NEAR * SURFACE_M
-            place = surface if near else Receiver(f"{known.distance_m:g} m", known.distance_m)
-            sigma_db = STATED_SIGMA_DB if known.sigma_db is None else known.sigma_db
-            source = known.origin or "stated in the campaign"
-            condition = conditions[known.condition]
-            data.append(MeasuredLevel(condition, place, known.level_db, sigma_db, known.weighting, "printed", source))
-    if not data:
-        raise FittingError(
-            f"{campaign.path}: no level to calibrate with: no receiver within 5 % of 4 m (role, distance_m) in a "
-            "usable run, and no [[level]]"
-        )
-    return data, doubts
+            distance_m = SURFACE_M if near else known.distance_m
+            found.append(
+                MeasuredLevel(
+                    condition=conditions[known.condition],
+                    receiver=Receiver(f"{distance_m:g} m", distance_m),
+                    level_db=known.level_db,
+                    sigma_db=STATED_SIGMA_DB if known.sigma_db is None else known.sigma_db,
+                    weighting=known.weighting,
+                    origin="printed",
+                    source=known.origin or "stated in the campaign",
+                )
+            )
+    return found, doubts
 
 
-def _recorded(campaign: Campaign, analysis: Analysis | None) -> Iterator[tuple[str, float, float]]:
-    """Yield condition, level and standard deviation of the 4 m level from recordings."""
-    from tdacoustic.measured.levels import energy_mean_db
-
-    if analysis is None:
-        return
-    near = {
-        channel.name
-        for channel in campaign.channels
-        if channel.quantity == "sound_pressure"
-        and channel.distance_m is not None
-        and abs(channel.distance_m - SURFACE_M) <= NEAR * SURFACE_M
-    }
-    table = analysis.tables["levels"]
-    tested = {run.name for run in analysis.runs if run.run.kind == "test" and run.run.valid}
-    held = table[table["channel"].isin(near) & table["run"].isin(tested) & table["level_db"].notna()]
-    for name, rows in held.groupby("condition", sort=False):
-        level_db = energy_mean_db(rows["level_db"])
-        by_run = [energy_mean_db(of_run["level_db"]) for _, of_run in rows.groupby("run")]
-        found = [level for level in by_run if level is not None]
-        spread = statistics.stdev(found) / len(found) ** 0.5 if len(found) > 1 else 0.0
-        if level_db is not None:
-            yield str(name), level_db, max(RECORDING_SIGMA_DB, spread)
+# ---------------------------------------------------------------- conditions
 
 
-def _conditions(campaign: Campaign, analysis: Analysis | None, fleet: Fleet) -> tuple[dict[str, Condition], list[str]]:
-    """Conditions with their speed and torque: the runs', else the fleet's of that name."""
+def campaign_conditions(
+    campaign: Campaign, analysis: Analysis | None, fleet: Fleet
+) -> tuple[dict[str, Condition], list[str]]:
+    """Return the conditions of a campaign by name, and what is doubtful about them.
+
+    Speed and torque are those of the runs, else those of the fleet's condition of that name; the torque of a run that
+    states none is the fleet's torque law at its speed. A run-up has no one speed and makes no condition.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    analysis : Analysis or None
+        For speeds that no run states, and for what is a run-up; None of a campaign without runs.
+    fleet : Fleet
+    """
     from tdacoustic.drive import Condition, conditions_of, torque_at
-    from tdacoustic.fleet import Kinematics
 
-    of_fleet: Mapping[str, Any] = {}
-    if fleet.operation.train_speed_km_h is not None:
-        of_fleet = {condition.name: condition for condition in conditions_of(fleet)}
+    tested = [run for run in campaign.test_runs() if run.valid]
+    run_ups = _run_ups(analysis)
     found: dict[str, Condition] = {}
-    doubts = []
-    modes = set()
+    doubts = [_run_up_doubt(run) for run in tested if run.name in run_ups]
     for name in campaign.conditions():
-        runs = [run for run in campaign.test_runs() if run.condition == name and run.valid]
-        speeds = [run.train_speed_km_h for run in runs if run.train_speed_km_h is not None]
-        if not speeds and analysis is not None:
-            speeds = [analysis.kinematics[run.name].train_speed_km_h for run in runs if run.name in analysis.kinematics]
+        runs = [run for run in tested if run.condition == name and run.name not in run_ups]
+        speeds = list(_speeds(runs, analysis, fleet))
         if not speeds:
-            if name in of_fleet:
-                found[name] = of_fleet[name]
+            if any(run.condition == name for run in tested if run.name in run_ups):
+                continue
+            if name in fleet.operation.names:
+                found[name] = next(condition for condition in conditions_of(fleet) if condition.name == name)
             else:
                 doubts.append(f"condition {name} has no speed, neither in its runs nor in the fleet: it is left out")
             continue
-        speed = statistics.fmean(speeds)
+        speed_km_h = statistics.fmean(train for train, _ in speeds)
+        motor_hz = statistics.fmean(motor for _, motor in speeds)
+        if not motor_hz > 0.0:
+            doubts.append(f"condition {name} stands still, where the model has no sound: it is left out")
+            continue
         torques = [run.torque_n_m for run in runs if run.torque_n_m is not None]
-        torque = statistics.fmean(torques) if torques else torque_at(fleet, speed)
-        stated = {run.mode for run in runs if run.mode is not None}
-        if not torques and stated and stated != {fleet.operation.mode.value}:
-            modes |= stated
-        motor_hz = Kinematics.of(fleet).motor_hz_at_km_h(speed)
-        found[name] = Condition(name, speed, motor_hz, torque, fleet.operation.mode.value)
+        torque = statistics.fmean(torques) if torques else torque_at(fleet, speed_km_h)
+        found[name] = Condition(name, speed_km_h, motor_hz, torque, fleet.operation.mode.value)
+    return found, [*doubts, *_other_modes(campaign, tested, fleet)]
+
+
+def _run_ups(analysis: Analysis | None) -> set[str]:
+    """Names of the runs whose speed is not constant."""
+    runs = () if analysis is None else analysis.runs
+    return {run.name for run in runs if run.measurement is not None and not run.measurement.steady}
+
+
+def _run_up_doubt(run: CampaignRun) -> str:
+    return f"run {run.name} of condition {run.condition} is a run-up: it has no one speed, and no level of its own"
+
+
+def _speeds(runs: Iterable[CampaignRun], analysis: Analysis | None, fleet: Fleet) -> Iterator[tuple[float, float]]:
+    """Train speed in km/h and turns of the motor per second of each run: as stated, else as measured."""
+    from tdacoustic.fleet import Kinematics
+
+    for run in runs:
+        drive = Kinematics.of(fleet, run.wheel_diameter_mm)
+        if run.train_speed_km_h is not None:
+            yield run.train_speed_km_h, drive.motor_hz_at_km_h(run.train_speed_km_h)
+        elif run.motor_speed_rpm is not None:
+            yield drive.train_speed_km_h(run.motor_speed_rpm / 60.0), run.motor_speed_rpm / 60.0
+        elif analysis is not None and run.name in analysis.kinematics:
+            measured = analysis.kinematics[run.name]
+            yield measured.train_speed_km_h, measured.motor_hz
+
+
+def _other_modes(campaign: Campaign, tested: Iterable[CampaignRun], fleet: Fleet) -> Iterator[str]:
+    """Say where runs were in another mode than the fleet's and state no torque."""
+    stated = fleet.operation.mode.value
+    tested = list(tested)
+    modes: set[str] = set()
+    for name in campaign.conditions():
+        runs = [run for run in tested if run.condition == name]
+        held = {run.mode for run in runs if run.mode is not None}
+        if held and held != {stated} and all(run.torque_n_m is None for run in runs):
+            modes |= held
     if modes:
-        doubts.append(
+        yield (
             f"the runs were {', '.join(sorted(modes))} and state no torque: the model computes the fleet's "
-            f"{fleet.operation.mode.value} at its torque law, another load than that of the test"
+            f"{stated} at its torque law, another load than that of the test"
         )
-    return found, doubts

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tdacoustic.errors import TdacousticError
+from tdacoustic.errors import FleetError, TdacousticError
 from tdacoustic.fleet import Fleet, load_fleet
 from tdacoustic.steps import Store, default_store_path, log_file
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
-    from tdacoustic.drive import DriveModel, SpeedSweep
+    from tdacoustic.drive import Condition, DriveModel, Receiver, SpeedSweep
     from tdacoustic.results import FleetPrediction
     from tdacoustic.steps import Record
 
@@ -20,9 +21,13 @@ __all__ = ["predict"]
 
 
 def predict(
-    fleet: str | Path | Fleet, store: str | Path | Store | None = None, progress: Progress | None = None
+    fleet: str | Path | Fleet,
+    store: str | Path | Store | None = None,
+    progress: Progress | None = None,
+    conditions: Iterable[Condition] | None = None,
+    receivers: Sequence[Receiver] = (),
 ) -> FleetPrediction:
-    """Compute the model of a fleet over its ``[operation]``.
+    """Compute the model of a fleet over its ``[operation]``, or over other conditions.
 
     Parameters
     ----------
@@ -31,6 +36,11 @@ def predict(
     store : path or Store, optional
         Where the sweep is kept; default `tdacoustic.steps.default_store_path`.
     progress : callable, optional
+    conditions : iterable of Condition, optional
+        Instead of those of ``[operation]``. The sweep of speed needs the fleet's torque law also then; where that is
+        missing the sweep is left out, and a doubt says so.
+    receivers : sequence of Receiver
+        Where levels are wanted besides the 4 m surface.
 
     Returns
     -------
@@ -39,7 +49,7 @@ def predict(
     Raises
     ------
     TdacousticError
-        The fleet is wrong, lacks a parameter, or its gears cannot be.
+        The fleet is wrong, lacks a parameter, or its gears cannot be; or there is no condition.
     """
     from tdacoustic.drive import DriveModel
     from tdacoustic.results import FleetPrediction, LogInput
@@ -48,10 +58,12 @@ def predict(
     fleet = fleet if isinstance(fleet, Fleet) else load_fleet(fleet)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     model = DriveModel(fleet)
-    prediction = model.evaluate()
-    sweep, records = _sweep(model, store, progress)
-    doubts = (*prediction.doubts, *_doubts_of_sweep(sweep))
-    prediction = replace(prediction, sweep=sweep, doubts=doubts)
+    held = model.conditions if conditions is None else tuple(conditions)
+    if not held:
+        raise FleetError(f"{fleet.path}: there is no condition to compute: no speed is known")
+    prediction = model.evaluate(held, receivers)
+    sweep, records, doubts = _sweep(model, max(condition.train_speed_km_h for condition in held), store, progress)
+    prediction = replace(prediction, sweep=sweep, doubts=(*prediction.doubts, *doubts))
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)
     file = log_file(fleet.path)
     inputs = (LogInput(fleet.path.name, file.sha256, file.n_bytes, "TOML"),)
@@ -59,22 +71,31 @@ def predict(
 
 
 def _sweep(
-    model: DriveModel, store: Store, progress: Progress | None
-) -> tuple[SpeedSweep, tuple[tuple[str, Record], ...]]:
+    model: DriveModel, fastest_km_h: float, store: Store, progress: Progress | None
+) -> tuple[SpeedSweep | None, tuple[tuple[str, Record], ...], list[str]]:
+    """Sweep, its records and its doubts."""
     from tdacoustic.drive import SpeedSweep
     from tdacoustic.drive.sweep_step import sweep_speeds_km_h, sweep_tasks
     from tdacoustic.steps import execute, lineage, result_of
 
-    fastest = max(condition.train_speed_km_h for condition in model.conditions)
-    speeds = sweep_speeds_km_h(model.fleet, fastest)
-    tasks = sweep_tasks(model, speeds)
+    speeds = sweep_speeds_km_h(model.fleet, fastest_km_h)
+    try:
+        tasks = sweep_tasks(model, speeds)
+    except FleetError as error:
+        return None, (), [f"no sweep of speed: {_without_path(model.fleet, error)}"]
     outcome = execute(list(tasks), store, 1, progress)
     failure: TdacousticError | None = next(iter(outcome.failed.values()), None)
     if failure is not None:
         raise failure
     up, down = (result_of(task, store) for task in tasks)
     records = dict(pair for task in tasks for pair in lineage(task, store))
-    return SpeedSweep(speeds, up, down), tuple(records.items())
+    sweep = SpeedSweep(speeds, up, down)
+    return sweep, tuple(records.items()), _doubts_of_sweep(sweep)
+
+
+def _without_path(fleet: Fleet, error: FleetError) -> str:
+    """An error's words with no folder of this machine: the same fleet elsewhere gives the same result."""
+    return str(error).removeprefix(f"{fleet.path}: ")
 
 
 def _doubts_of_sweep(sweep: SpeedSweep) -> list[str]:

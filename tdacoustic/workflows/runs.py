@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from tdacoustic.attribution import EVIDENCE, EvidenceSettings
-from tdacoustic.campaign import Campaign, CampaignRun
+from tdacoustic.campaign import Campaign, CampaignRun, WrittenPath
 from tdacoustic.errors import TdacousticError
 from tdacoustic.formats import scan
 from tdacoustic.ingest import Bound, bind_run, check_coverage
@@ -17,7 +18,15 @@ from tdacoustic.recording import Channel, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
 
-__all__ = ["PreparedRun", "gather_run", "log_inputs", "prepare_runs", "run_problems", "written_inputs"]
+__all__ = [
+    "PreparedRun",
+    "fleet_input",
+    "gather_run",
+    "log_inputs",
+    "prepare_runs",
+    "run_problems",
+    "written_inputs",
+]
 
 
 @dataclass(frozen=True)
@@ -52,16 +61,16 @@ class PreparedRun:
         return self.evidence or self.measurement
 
 
-def prepare_runs(campaign: Campaign, store: Store) -> tuple[PreparedRun, ...]:
+def prepare_runs(campaign: Campaign, store: Store, without_runs: bool = False) -> tuple[PreparedRun, ...]:
     """Scan and hash the logs of all valid runs, bind their channels and make their tasks.
 
     Raises
     ------
     TdacousticError
-        No run can be read, or a channel can be used in no run.
+        No run can be read (unless `without_runs`), or a channel can be used in no run.
     """
     prepared = [_prepare(campaign, run, store) for run in campaign.runs if run.valid]
-    _check_coverage(campaign, prepared)
+    _check_coverage(campaign, prepared, without_runs)
     bound = [item.bound.recording for item in prepared if item.bound is not None]
     microphones = receivers_of(bound)
     return tuple(replace(item, evidence=_evidence(item, microphones)) for item in prepared)
@@ -118,12 +127,14 @@ def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
     return tuple(stated)
 
 
-def _check_coverage(campaign: Campaign, prepared: Sequence[PreparedRun]) -> None:
+def _check_coverage(campaign: Campaign, prepared: Sequence[PreparedRun], without_runs: bool) -> None:
     """Raise where nothing can be used, or where a channel can be used in no run."""
     if not prepared:
         return
     errors = [item.error for item in prepared if item.error is not None]
     if len(errors) == len(prepared):
+        if without_runs:
+            return
         first = errors[0]
         raise type(first)("\n".join(dict.fromkeys(str(error) for error in errors))) from first
     check_coverage([item.bound for item in prepared if item.bound is not None], campaign.channels)
@@ -175,11 +186,20 @@ def written_inputs(campaign: Campaign, with_fleet: bool) -> tuple[LogInput, ...]
     files = [(campaign.path.name, campaign.path, "campaign")]
     if campaign.run_table is not None:
         files.append((campaign.run_table.text, campaign.run_table.path, "runs"))
+    found = [_input(*file) for file in files]
     if campaign.fleet is not None and with_fleet:
-        path = campaign.fleet.path
-        files.append((campaign.fleet.text, path / "fleet.toml" if path.is_dir() else path, "fleet"))
-    hashed = [(text, log_file(path), kind) for text, path, kind in files]
-    return tuple(LogInput(text, file.sha256, file.n_bytes, kind) for text, file, kind in hashed)
+        found.append(fleet_input(campaign.fleet, "fleet"))
+    return tuple(found)
+
+
+def fleet_input(fleet: WrittenPath, kind: str) -> LogInput:
+    """Return a fleet file as an input; its folder may be named in its stead."""
+    return _input(fleet.text, fleet.path / "fleet.toml" if fleet.path.is_dir() else fleet.path, kind)
+
+
+def _input(text: str, path: Path, kind: str) -> LogInput:
+    file = log_file(path)
+    return LogInput(text, file.sha256, file.n_bytes, kind)
 
 
 def log_inputs(prepared: Sequence[PreparedRun]) -> tuple[LogInput, ...]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tdacoustic.results import Analysis
+    from tdacoustic.results import Analysis, CampaignResult
 
-__all__ = ["summary_lines"]
+__all__ = ["run_lines", "summary_lines"]
 
 
 def summary_lines(analysis: Analysis) -> tuple[str, ...]:
@@ -16,3 +16,11 @@ def summary_lines(analysis: Analysis) -> tuple[str, ...]:
     from tdacoustic.reporting.sections.answer import answer
 
     return tuple(item for block in answer(analysis) if isinstance(block, Sentences) for item in block.items)
+
+
+def run_lines(result: CampaignResult) -> tuple[str, ...]:
+    """Return the sentences of `summary_lines`, then a line each on calibration and prediction where there is one."""
+    from tdacoustic.reporting.sections.run_answer import calibration_line, prediction_line
+
+    modelled = (calibration_line(result), prediction_line(result))
+    return (*summary_lines(result.analysis), *(line for line in modelled if line))

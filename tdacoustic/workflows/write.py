@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from tdacoustic.workflows.output import OutputFolder
 
 if TYPE_CHECKING:
-    from tdacoustic.results import Analysis, CampaignCalibration, FleetPrediction, LogInput
-    from tdacoustic.steps import Record
+    import pandas as pd
 
-__all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction"]
+    from tdacoustic.campaign import Campaign
+    from tdacoustic.measured.runs import MeasuredRun
+    from tdacoustic.reporting.document import Document
+    from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
+    from tdacoustic.steps import Record
+    from tdacoustic.tables.prediction_file import ModelArrays
+
+__all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction", "write_run"]
+
+ARRAYS = "result.h5"
 
 
 def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> None:
@@ -26,51 +34,20 @@ def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> No
     command : str
         For the manifest.
     """
-    from tdacoustic.reporting.html import render_html
     from tdacoustic.reporting.measured_report import measured_report
-    from tdacoustic.tables import csv_text
-    from tdacoustic.tables.result_file import write_result_file
 
-    campaign = analysis.campaign
     with folder:
-        for name, table in analysis.tables.items():
-            folder.write_text(f"{name}.csv", csv_text(table))
-        write_result_file(folder.staging / "result.h5", campaign.name, campaign.origin, analysis.runs)
-        folder.write_text("report.html", render_html(measured_report(analysis)))
+        _write_tables(folder, analysis.tables)
+        _write_arrays(folder, analysis.campaign, analysis.runs)
+        _write_report(folder, measured_report(analysis))
         folder.manifest = _manifest(analysis, command)
 
 
 def write_check(analysis: Analysis, out: Path, subject: Path, overwrite: bool) -> None:
     """Write ``quality.csv`` into an output folder, beside what a whole run has left there."""
-    from tdacoustic.tables import csv_text
-
     with OutputFolder(out, subject, overwrite, keep=True) as folder:
-        folder.write_text("quality.csv", csv_text(analysis.tables["quality"]))
+        _write_tables(folder, {"quality": analysis.tables["quality"]})
         folder.manifest = _manifest(analysis, "check")
-
-
-def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
-    """Return what the manifest says besides its files."""
-    campaign = analysis.campaign
-    return {
-        "command": command,
-        "campaign": {"name": campaign.name, "origin": campaign.origin},
-        "inputs": _inputs(analysis.inputs),
-        "settings": {key: list(v) if isinstance(v, tuple) else v for key, v in analysis.settings.items()},
-        "steps": _steps(analysis.records),
-        "versions": analysis.versions,
-        "problems": list(analysis.problems),
-    }
-
-
-def _inputs(files: Sequence[LogInput]) -> list[dict[str, Any]]:
-    return [
-        {"file": file.written, "sha256": file.sha256, "bytes": file.n_bytes, "format": file.format} for file in files
-    ]
-
-
-def _steps(records: Sequence[tuple[str, Record]]) -> list[str]:
-    return sorted({f"{record.step}/{record.version}" for _, record in records})
 
 
 def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
@@ -82,21 +59,16 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
     folder : OutputFolder
         Not entered yet.
     """
-    from tdacoustic.reporting.html import render_html
     from tdacoustic.reporting.predicted_report import predicted_report
-    from tdacoustic.tables import csv_text
     from tdacoustic.tables.prediction_file import write_prediction_file
 
-    fleet = result.fleet
     with folder:
-        for name, table in result.tables.items():
-            folder.write_text(f"{name}.csv", csv_text(table))
-        highest_hz = fleet.radiation.max_frequency_hz.value
-        write_prediction_file(folder.staging / "result.h5", fleet.name, result.prediction, highest_hz)
-        folder.write_text("report.html", render_html(predicted_report(result)))
+        _write_tables(folder, result.tables)
+        write_prediction_file(folder.staging / ARRAYS, _model_arrays(result))
+        _write_report(folder, predicted_report(result))
         folder.manifest = {
             "command": "predict",
-            "fleet": {"name": fleet.name},
+            "fleet": {"name": result.fleet.name},
             "inputs": _inputs(result.inputs),
             "steps": _steps(result.records),
             "versions": result.versions,
@@ -113,24 +85,111 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
     folder : OutputFolder
         Not entered yet.
     """
-    from tdacoustic.fleet import fleet_toml
     from tdacoustic.reporting.calibration_report import calibration_report
-    from tdacoustic.reporting.html import render_html
-    from tdacoustic.tables.result_file import write_result_file
-    from tdacoustic.workflows.calibrate import calibration_json
 
-    campaign, found = result.campaign, result.calibration
     with folder:
-        folder.write_text("calibration.json", calibration_json(result))
-        folder.write_text("fleet.calibrated.toml", fleet_toml(found.fleet))
-        runs = () if result.analysis is None else result.analysis.runs
-        write_result_file(folder.staging / "result.h5", campaign.name, campaign.origin, runs)
-        folder.write_text("report.html", render_html(calibration_report(result)))
+        _write_fit(folder, result)
+        _write_arrays(folder, result.campaign, () if result.analysis is None else result.analysis.runs)
+        _write_report(folder, calibration_report(result))
         folder.manifest = {
             "command": "calibrate",
-            "campaign": {"name": campaign.name, "origin": campaign.origin},
+            "campaign": _named(result.campaign),
             "fleet": {"name": result.fleet.name},
             "inputs": _inputs(result.inputs),
             "versions": result.versions,
-            "problems": list(found.doubts),
+            "problems": list(result.calibration.doubts),
         }
+
+
+def write_run(result: CampaignResult, folder: OutputFolder) -> None:
+    """Write the files of analysis, calibration and prediction into one output folder, with one report.
+
+    Parameters
+    ----------
+    result : CampaignResult
+    folder : OutputFolder
+        Not entered yet.
+    """
+    from tdacoustic.reporting.run_report import run_report
+
+    analysis, prediction = result.analysis, result.prediction
+    with folder:
+        _write_tables(folder, analysis.tables)
+        if result.calibration is not None:
+            _write_fit(folder, result.calibration)
+        if prediction is not None:
+            _write_tables(folder, prediction.tables)
+        _write_arrays(folder, result.campaign, analysis.runs, prediction)
+        _write_report(folder, run_report(result))
+        folder.manifest = {
+            **_manifest(analysis, "run"),
+            **({} if analysis.fleet is None else {"fleet": {"name": analysis.fleet.name}}),
+            "inputs": _inputs(result.inputs),
+            "settings": result.settings,
+            "steps": _steps(result.records),
+            "problems": [*result.problems, *result.doubts],
+        }
+
+
+def _write_tables(folder: OutputFolder, tables: Mapping[str, pd.DataFrame]) -> None:
+    from tdacoustic.tables import csv_text
+
+    for name, table in tables.items():
+        folder.write_text(f"{name}.csv", csv_text(table))
+
+
+def _write_fit(folder: OutputFolder, result: CampaignCalibration) -> None:
+    from tdacoustic.fleet import fleet_toml
+    from tdacoustic.workflows.calibration_file import calibration_json
+
+    folder.write_text("calibration.json", calibration_json(result))
+    folder.write_text("fleet.calibrated.toml", fleet_toml(result.calibration.fleet))
+
+
+def _write_arrays(
+    folder: OutputFolder, campaign: Campaign, runs: Sequence[MeasuredRun], prediction: FleetPrediction | None = None
+) -> None:
+    from tdacoustic.tables.result_file import write_result_file
+
+    model = None if prediction is None else _model_arrays(prediction)
+    write_result_file(folder.staging / ARRAYS, campaign.name, campaign.origin, runs, model)
+
+
+def _model_arrays(result: FleetPrediction) -> ModelArrays:
+    from tdacoustic.tables.prediction_file import ModelArrays
+
+    fleet = result.fleet
+    return ModelArrays(fleet.name, result.prediction, fleet.radiation.max_frequency_hz.value)
+
+
+def _write_report(folder: OutputFolder, document: Document) -> None:
+    from tdacoustic.reporting.html import render_html
+
+    folder.write_text("report.html", render_html(document))
+
+
+def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
+    """Return what the manifest says besides its files."""
+    return {
+        "command": command,
+        "campaign": _named(analysis.campaign),
+        "inputs": _inputs(analysis.inputs),
+        "settings": {key: list(v) if isinstance(v, tuple) else v for key, v in analysis.settings.items()},
+        "steps": _steps(analysis.records),
+        "versions": analysis.versions,
+        "problems": list(analysis.problems),
+    }
+
+
+def _named(campaign: Campaign) -> dict[str, str]:
+    return {"name": campaign.name, "origin": campaign.origin}
+
+
+def _inputs(files: Sequence[LogInput]) -> list[dict[str, Any]]:
+    return [
+        {"file": file.written, "sha256": file.sha256, "bytes": file.n_bytes, "format": file.format} for file in files
+    ]
+
+
+def _steps(records: Sequence[tuple[str, Record]]) -> list[str]:
+    return sorted({f"{record.step}/{record.version}" for _, record in records})

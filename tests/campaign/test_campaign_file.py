@@ -141,7 +141,7 @@ def test_the_whole_contract_is_read(load, tmp_path):
     assert campaign.fleet.path == tmp_path / ".." / "fleet.toml"
     assert campaign.meta == (("weather", "dry"), ("wind.speed_m_s", "3"), ("wind.from", "N, W"))
     assert campaign.overrides[0].frequency_hz == 462.0
-    assert campaign.settings == {
+    assert {key: value for key, value in campaign.settings.items() if not key.startswith("calibration.")} == {
         "analysis.orders": (2.0, 4.0, 31.0),
         "analysis.level_band_hz": (20.0, 5000.0),
         "analysis.frequency_resolution_hz": 1.0,
@@ -150,9 +150,58 @@ def test_the_whole_contract_is_read(load, tmp_path):
         "analysis.line_prominence_db": AnalysisSettings().line_prominence_db,
         "analysis.speed_tolerance": 0.03,
         "analysis.mains_hz": 50.0,
-        "calibration.free": ("masuda.constant_db",),
-        "calibration.model_sigma_db": 4.0,
     }
+    assert campaign.settings["calibration.free"] == ("masuda.constant_db",)
+    assert campaign.settings["calibration.model_sigma_db"] == 4.0
+
+
+CALIBRATION = """
+[calibration]
+free = ["masuda.constant_db"]
+data = ["receivers", "bands"]
+model_sigma_db = 2
+fit_model_sigma = true
+level_sigma_db = 0.5
+loss = "huber"
+starts = 5
+posterior = true
+posterior_walkers = 40
+posterior_steps = 500
+prior_fleet = "../first/fleet.calibrated.toml"
+prior_discount = 3
+with_campaigns = ["../second"]
+offset_sigma_db = 0.7
+[[calibration.parameter]]
+name = "gear_dynamics.mesh_damping_ratio"
+value = 0.04
+min = 0.01
+max = 0.2
+prior_mean = 0.05
+prior_sigma = 0.02
+scale = "log"
+[[calibration.parameter]]
+name = "twice"
+expression = "2 * gear_dynamics.mesh_damping_ratio"
+[[level]]
+condition = "1"
+distance_m = 4
+level_db = 80
+"""
+
+
+def test_the_whole_of_calibration_is_read(load, tmp_path):
+    calibration = load(CALIBRATION).calibration
+    assert calibration.names == ("masuda.constant_db", "gear_dynamics.mesh_damping_ratio", "twice")
+    damping = calibration.stated("gear_dynamics.mesh_damping_ratio")
+    assert (damping.min, damping.max, damping.prior_mean, damping.prior_sigma) == (0.01, 0.2, 0.05, 0.02)
+    assert calibration.stated("masuda.constant_db").min is None
+    assert calibration.data == ("receivers", "bands")
+    assert calibration.prior_fleet.path == tmp_path / ".." / "first" / "fleet.calibrated.toml"
+    assert [campaign.text for campaign in calibration.with_campaigns] == ["../second"]
+    shown = load(CALIBRATION).settings
+    assert shown["calibration.parameter"][1] == "name = twice, expression = 2 * gear_dynamics.mesh_damping_ratio"
+    assert shown["calibration.with_campaigns"] == ("../second",)
+    assert shown["calibration.prior_fleet"] == "../first/fleet.calibrated.toml"
 
 
 def test_a_campaign_is_frozen_hashable_and_picklable(load):

@@ -10,6 +10,7 @@ from tdacoustic.drive import Receiver
 from tdacoustic.errors import FittingError
 from tdacoustic.fitting.calibration import calibrate_fleet, free_parameter
 from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+from tdacoustic.fitting.settings import FitSettings
 
 CALIBRATION = Path(__file__).resolve().parents[2] / "calibration"
 CONSTANT, DAMPING = "masuda.constant_db", "gear_dynamics.mesh_damping_ratio"
@@ -32,7 +33,7 @@ def data(fleet):
 
 def test_values_come_back_and_the_fleet_carries_them(fleet, data):
     free = [free_parameter(fleet, key) for key in TRUTH]
-    found = calibrate_fleet(fleet, data, free, 0.0, origin="calibrated by a test", starts=2)
+    found = calibrate_fleet(fleet, data, free, FitSettings(0.0, starts=2), origin="calibrated by a test")
     for parameter in found.parameters:
         assert parameter.value == pytest.approx(TRUTH[parameter.key], rel=1e-4)
         low, high = parameter.ci95
@@ -48,15 +49,15 @@ def test_values_come_back_and_the_fleet_carries_them(fleet, data):
 def test_a_source_inside_the_box_cannot_be_seen(fleet, data):
     inside = fleet.replaced({"masuda.placement": "inside"})
     with pytest.raises(FittingError, match="the model gives no level in condition 2, 5, 6"):
-        calibrate_fleet(inside, data, [free_parameter(inside, CONSTANT)], 1.0, starts=1)
+        calibrate_fleet(inside, data, [free_parameter(inside, CONSTANT)])
 
 
 def test_a_condition_far_off_and_one_condition_alone_are_doubted(fleet, data):
     free = [free_parameter(fleet, CONSTANT)]
     off = [*data[:-1], replace(data[-1], level_db=data[-1].level_db + 15.0)]
-    found = calibrate_fleet(fleet, off, free, 0.5, starts=1)
+    found = calibrate_fleet(fleet, off, free, FitSettings(0.5, starts=1))
     assert any("does not reach the data" in doubt for doubt in found.doubts)
-    alone = calibrate_fleet(fleet, data[:1], free, 1.0, starts=1)
+    alone = calibrate_fleet(fleet, data[:1], free, FitSettings(1.0, starts=1))
     assert any("one condition" in doubt for doubt in alone.doubts)
     assert alone.left_out[0].error_db is None
 

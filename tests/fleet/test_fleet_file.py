@@ -174,6 +174,7 @@ def test_defaults_are_those_of_the_contract_and_say_so(load):
         "masuda.weighting": ("Z", default),
         "model.gear_path": ("masuda", default),
         "model.structure_gain_db": (0.0, default),
+        "model.motor_gain_db": (0.0, default),
         "radiation.method": ("point_sources", default),
         "radiation.space": ("free", default),
         "radiation.max_frequency_hz": (3000.0, default),

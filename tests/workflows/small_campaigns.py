@@ -6,6 +6,9 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from tdacoustic.fleet import fleet_toml, load_fleet
+
+REFERENCE = Path(__file__).resolve().parents[2] / "calibration" / "reference-drive"
 RATE_HZ = 4096.0
 
 
@@ -54,6 +57,18 @@ def small_campaign(folder, seconds=2.0, conditions=("a", "b", "c"), channels=MIC
         )
     path = folder / "campaign.toml"
     path.write_text(HEAD + channels + "".join(map(run_table, conditions)) + text, encoding="utf-8")
+    return path
+
+
+def fleet_campaign(folder, conditions=("a", "b"), fleet=None, channels=MIC):
+    """A small campaign with a fleet beside it: that text, else the reference drive at two speeds and one angle."""
+    if fleet is None:
+        few = {"operation.train_speed_km_h": (30.0, 60.0), "operation.helix_angle_deg": (4.0,)}
+        fleet = fleet_toml(load_fleet(REFERENCE).replaced(few, origin="a test"))
+    path = small_campaign(folder, conditions=conditions, channels=channels)
+    (path.parent / "fleet.toml").write_text(fleet, encoding="utf-8")
+    text = path.read_text(encoding="utf-8").replace("\n\n", '\nfleet = "fleet.toml"\n\n', 1)
+    path.write_text(text, encoding="utf-8")
     return path
 
 

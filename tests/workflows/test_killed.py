@@ -1,6 +1,7 @@
 """A run that is killed at any moment leaves nothing half written, goes on when run again, and ends the same.
 
-``TDACOUSTIC_KILLS=20`` kills it 20 times; the moments are drawn with a fixed seed over the time one run takes.
+``TDACOUSTIC_KILLS=20`` kills it 20 times, and half as often with a fleet, where it calibrates and predicts too; the
+moments are drawn with a fixed seed over the time one run takes.
 """
 
 import hashlib
@@ -14,7 +15,7 @@ import time
 from pathlib import Path
 
 import pytest
-from small_campaigns import files_of, small_campaign
+from small_campaigns import files_of, fleet_campaign, small_campaign
 
 KILLS = int(os.environ.get("TDACOUSTIC_KILLS", "4"))
 ROOT = Path(__file__).resolve().parents[2]
@@ -73,27 +74,47 @@ def alive_in_session(session):
     return found
 
 
-@pytest.fixture(scope="module")
-def reference(tmp_path_factory):
+def undisturbed(campaign, folder):
     """A campaign, its result when nothing disturbs, and how long that takes."""
-    folder = tmp_path_factory.mktemp("undisturbed")
-    campaign = small_campaign(tmp_path_factory.mktemp("campaign"), seconds=4.0)
     start = time.monotonic()
     finished(campaign, folder)
     took_s = time.monotonic() - start
-    held = files_of(folder / "result")
-    assert len(held) >= 9
-    return campaign, held, took_s
+    return campaign, files_of(folder / "result"), took_s
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    campaign = small_campaign(tmp_path_factory.mktemp("campaign"), seconds=4.0)
+    found = undisturbed(campaign, tmp_path_factory.mktemp("undisturbed"))
+    assert len(found[1]) >= 9
+    return found
+
+
+@pytest.fixture(scope="module")
+def reference_with_fleet(tmp_path_factory):
+    campaign = fleet_campaign(tmp_path_factory.mktemp("campaign"))
+    found = undisturbed(campaign, tmp_path_factory.mktemp("undisturbed"))
+    assert {"levels.csv", "calibration.json", "speed_sweep.csv"} < set(found[1])
+    return found
+
+
+def assert_killed_and_run_again_it_is_the_same(reference, folder, number, kills):
+    campaign, expected, took_s = reference
+    moment_s = took_s * random.Random(1000 + number).uniform(number, number + 1) / kills
+    killed(moment_s, campaign, folder)
+    assert_whole(folder / "result")
+    finished(campaign, folder)
+    assert files_of(folder / "result") == expected
 
 
 @pytest.mark.parametrize("number", range(KILLS))
 def test_killed_and_run_again_the_result_is_the_same(reference, tmp_path, number):
-    campaign, expected, took_s = reference
-    moment_s = took_s * random.Random(1000 + number).uniform(number, number + 1) / KILLS
-    killed(moment_s, campaign, tmp_path)
-    assert_whole(tmp_path / "result")
-    finished(campaign, tmp_path)
-    assert files_of(tmp_path / "result") == expected
+    assert_killed_and_run_again_it_is_the_same(reference, tmp_path, number, KILLS)
+
+
+@pytest.mark.parametrize("number", range(KILLS // 2))
+def test_killed_and_run_again_with_a_fleet_the_result_is_the_same(reference_with_fleet, tmp_path, number):
+    assert_killed_and_run_again_it_is_the_same(reference_with_fleet, tmp_path, number, KILLS // 2)
 
 
 @pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="looks at processes through /proc")

@@ -23,7 +23,7 @@ from tdacoustic.reporting.sections.words import (
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
 
-__all__ = ["answer"]
+__all__ = ["answer", "conditions_answer", "verdicts_answer"]
 
 NAMED_LINES = 3
 MOST_OF_THE_SOUND = 0.5
@@ -46,15 +46,25 @@ SHARE_WORDS = {"ambiguous": "belongs to either, motor or gearbox", "unassigned":
 
 def answer(analysis: Analysis) -> list[Block]:
     """Return the summary: a sentence a condition, the verdicts side by side, then what could not be done."""
-    sentences = [_of_condition(analysis, condition) for condition in analysis.campaign.conditions()]
-    blocks: list[Block] = [Sentences(sentences)] if sentences else []
-    if analysis.fleet is not None:
-        blocks += _verdicts(analysis)
-    elif analysis.campaign.fleet is None and analysis.sources:
+    return [*_sentences(analysis), *verdicts_answer(analysis), *_notices(analysis)]
+
+
+def conditions_answer(analysis: Analysis) -> list[Block]:
+    """Return a sentence a condition, then what could not be done: `answer` without the verdicts side by side."""
+    return [*_sentences(analysis), *_notices(analysis)]
+
+
+def _sentences(analysis: Analysis) -> list[Block]:
+    found = [_of_condition(analysis, condition) for condition in analysis.campaign.conditions()]
+    return [Sentences(found)] if found else []
+
+
+def _notices(analysis: Analysis) -> list[Block]:
+    found = [Notice("warning", f"Not done: {problem}") for problem in analysis.problems]
+    if analysis.fleet is None and analysis.campaign.fleet is None and analysis.sources:
         text = "No fleet file: whose order a line is, is not known, so no source is named and no verdict is given."
-        blocks.append(Notice("info", text))
-    blocks += [Notice("warning", f"Not done: {problem}") for problem in analysis.problems]
-    return blocks
+        found.insert(0, Notice("info", text))
+    return list(found)
 
 
 def _of_condition(analysis: Analysis, condition: str) -> str:
@@ -171,8 +181,10 @@ def _strongest_words(held: list[SourceLine]) -> str:
     return f"strongest noise lines {', '.join(named)}" if named else ""
 
 
-def _verdicts(analysis: Analysis) -> list[Block]:
-    """The verdicts in a table and as bars; nothing where no condition has lines."""
+def verdicts_answer(analysis: Analysis) -> list[Block]:
+    """Return the verdicts in a table and as bars; nothing without a fleet, or where no condition has lines."""
+    if analysis.fleet is None:
+        return []
     judged = [verdict for verdict in analysis.dominance if verdict.shares]
     if not judged:
         return []

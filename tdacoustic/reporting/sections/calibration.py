@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from tdacoustic.fitting.calibration import Calibration, FittedParameter
 from tdacoustic.reporting.document import (
     Block,
-    Cell,
-    Column,
+    Details,
     FigureBlock,
     Notice,
     Paragraph,
@@ -18,21 +15,40 @@ from tdacoustic.reporting.document import (
     Sentences,
     Table,
 )
-from tdacoustic.reporting.figure import Axis, Figure, Line, Markers
+from tdacoustic.reporting.sections.calibration_figures import (
+    contributions_figure,
+    levels_figure,
+    residuals_figure,
+)
+from tdacoustic.reporting.sections.calibration_tables import (
+    contributions_table,
+    correlation_table,
+    levels_table,
+    next_measurement_table,
+    parameters_table,
+    posterior_table,
+    sources_table,
+    transfer_table,
+)
+from tdacoustic.reporting.sections.printed import LARGEST_ERROR_DB, MODEL_4M, is_of_the_paper
 from tdacoustic.results import CampaignCalibration
 
 __all__ = ["calibration_answer", "calibration_section"]
+
+MANY_LEVELS = 24
+"""Levels beyond which their table is folded away."""
 
 
 def calibration_answer(result: CampaignCalibration) -> list[Block]:
     """Return what the calibration found in sentences, then its doubts."""
     found = result.calibration
     sentences = [_value_words(parameter) for parameter in found.parameters]
-    sentences.append(_misfit_words(found))
+    sentences.append(_misfit_words(result))
     left = [item.error_db for item in found.left_out if item.error_db is not None]
     if left:
         rms = math.sqrt(sum(error**2 for error in left) / len(left))
         sentences.append(f"Each condition predicted from the others alone is off by {rms:.1f} dB rms.")
+    sentences += _next_words(found)
     return [Sentences(sentences), *(Notice("warning", _sentence(doubt)) for doubt in found.doubts)]
 
 
@@ -42,103 +58,122 @@ def _sentence(doubt: str) -> str:
     return f"{doubt if starts_with_key else doubt[:1].upper() + doubt[1:]}."
 
 
+def _value_words(parameter: FittedParameter) -> str:
+    text = f"{parameter.key} is {parameter.value:.4g} (it was {parameter.initial:.4g})"
+    if parameter.expression is not None:
+        return f"{text}, by {parameter.expression}."
+    if parameter.ci95 is None:
+        return f"{text}; the data give no interval."
+    if parameter.ci95 == (None, None):
+        return f"{text}; its 95 % interval reaches from bound to bound, {parameter.low:g} to {parameter.high:g}."
+    low, high = ("open" if end is None else f"{end:.4g}" for end in parameter.ci95)
+    return f"{text}; 95 % interval {low} to {high}."
+
+
+def _rms(errors: list[float]) -> float:
+    return math.sqrt(sum(error**2 for error in errors) / len(errors))
+
+
+def _misfit_words(result: CampaignCalibration) -> str:
+    found = result.calibration
+    before = _rms([level.before_db - level.datum.level_db for level in found.levels])
+    after = [level.error_db for level in found.levels]
+    worst = max(found.levels, key=lambda level: abs(level.error_db))
+    text = (
+        f"The levels are off by {before:.1f} dB rms before and by {_rms(after):.1f} dB rms after the calibration, at "
+        f"most by {abs(worst.error_db):.1f} dB (condition {worst.datum.condition.name})"
+    )
+    if is_of_the_paper(result.fleet):
+        text += f"; the paper states a largest error of {LARGEST_ERROR_DB:g} dB of its model"
+    return f"{text}."
+
+
+def _next_words(found: Calibration) -> list[str]:
+    if not found.next_measurements:
+        return []
+    best = found.next_measurements[0]
+    parts = [f"{name} {100.0 * part:.0f} %" for name, part in best.remaining.items()]
+    return [
+        f"What would tell most next is a level at {best.condition.train_speed_km_h:.3g} km/h and "
+        f"{best.condition.torque_n_m:.4g} N m, {best.receiver.name}: of the intervals it would leave "
+        f"{', '.join(parts)}."
+    ]
+
+
 def calibration_section(result: CampaignCalibration) -> Section:
     """Return the section on the calibration."""
     found = result.calibration
-    text = (
-        "The levels are fitted by weighted least squares from several starts (lmfit). A datum's standard deviation is "
-        f"that of the measurement and of the model together ({result.campaign.calibration.model_sigma_db:g} dB, by "
-        "[calibration] model_sigma_db): the model's is what its lines on unknown modes scatter by. Intervals are by "
-        "profile likelihood; an end that a bound comes before is left open."
-    )
-    blocks: list[Block] = [Paragraph(text), _parameters(found), FigureBlock(_figure(result), None), _levels(result)]
+    blocks: list[Block] = [Paragraph(_method_words(found)), parameters_table(found)]
+    printed = _printed_words(result)
+    blocks += [Paragraph(printed)] if printed else []
+    figures = [levels_figure(result), contributions_figure(result), residuals_figure(result)]
+    blocks += [FigureBlock(figure, None) for figure in figures if figure is not None]
+    levels = levels_table(result)
+    blocks.append(Details("Levels and model by condition", [levels]) if len(levels.rows) > MANY_LEVELS else levels)
+    blocks.append(Details("Where the levels and their standard deviations come from", [sources_table(result)]))
+    blocks.append(Details("Contributions at each receiver, before and after", [contributions_table(found)]))
+    blocks.append(Section("calibration-told", "What the data tell", _told(found)))
     return Section("calibration", "Calibration", blocks)
 
 
-def _value_words(parameter: FittedParameter) -> str:
-    text = f"{parameter.key} is {parameter.value:.4g} (it was {parameter.initial:.4g})"
-    if parameter.ci95 is not None:
-        low, high = ("open" if end is None else f"{end:.4g}" for end in parameter.ci95)
-        return f"{text}; 95 % interval {low} to {high}."
-    return f"{text}; the data give no interval."
-
-
-def _misfit_words(found: Calibration) -> str:
-    def rms(errors: list[float]) -> float:
-        return math.sqrt(sum(error**2 for error in errors) / len(errors))
-
-    before = rms([level.before_db - level.datum.level_db for level in found.levels])
-    after = rms([level.error_db for level in found.levels])
-    return f"The levels are off by {before:.1f} dB rms before and by {after:.1f} dB rms after the calibration."
-
-
-def _parameters(found: Calibration) -> Table:
-    columns = (
-        Column("parameter", "Parameter"),
-        Column("initial", "Before", kind="number"),
-        Column("value", "After", kind="number"),
-        Column("stderr", "±", "1 σ", kind="number"),
-        Column("low", "95 % from", kind="number"),
-        Column("high", "95 % to", kind="number"),
-        Column("bounds", "Bounds"),
+def _method_words(found: Calibration) -> str:
+    scatter = (
+        f"{found.model_sigma_db:.2g} dB, taken from the misfit"
+        if found.model_sigma_is_fitted
+        else f"{found.model_sigma_db:g} dB, by [calibration] model_sigma_db"
     )
-    rows: list[list[Cell]] = []
-    for p in found.parameters:
-        low, high = (None, None) if p.ci95 is None else p.ci95
-        rows.append([p.key, p.initial, p.value, p.stderr, low, high, f"{p.low:g} to {p.high:g}"])
-    return Table("calibrated-parameters", "Fitted parameters", columns, rows, origin="calculated")
-
-
-def _levels(result: CampaignCalibration) -> Table:
-    found = result.calibration
-    left = {item.condition: item.error_db for item in found.left_out}
-    columns = (
-        Column("condition", "Condition"),
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("receiver", "At"),
-        Column("origin", "Standing", kind="origin"),
-        Column("measured_db", "Level", "dB", 1, "number"),
-        Column("before_db", "Before", "dB", 1, "number"),
-        Column("predicted_db", "After", "dB", 1, "number"),
-        Column("error_db", "After less level", "dB", 1, "number"),
-        Column("sigma_db", "σ", "dB", 1, "number"),
-        Column("left_out_db", "Left out", "predicted less level, dB", 1, "number"),
+    loss = "" if found.settings.loss == "linear" else f" with the robust loss {found.settings.loss}"
+    interpolated = (
+        ""
+        if found.interpolated_db is None
+        else " The search went over levels interpolated between computed ones (largest difference at checked places "
+        f"{found.interpolated_db:.2g} dB); the levels after it are computed."
     )
-    rows: list[list[Cell]] = [
-        [
-            level.datum.condition.name,
-            level.datum.condition.train_speed_km_h,
-            level.datum.receiver.name,
-            level.datum.origin,
-            level.datum.level_db,
-            level.before_db,
-            level.predicted_db,
-            level.error_db,
-            level.sigma_db,
-            left.get(level.datum.condition.name),
-        ]
-        for level in found.levels
+    return (
+        f"The levels are fitted by weighted least squares{loss} from {found.settings.starts} starts (lmfit). A datum's "
+        f"standard deviation is that of the measurement and of the model together ({scatter}): the model's is what its "
+        "lines on unknown modes scatter by, and the receivers of a condition share it. Intervals are by profile "
+        f"likelihood; an end that a bound comes before is left open.{interpolated}"
+    )
+
+
+def _printed_words(result: CampaignCalibration) -> str:
+    """Our level beside each one that the paper prints of its own model; empty of another drive."""
+    ours = {item.condition: item.after_db for item in result.over_speed}
+    parts = [
+        f"{ours[row.conditions[0]]:.1f} against {row.level_db:g} dB in condition {row.conditions[0]}"
+        for row in MODEL_4M
+        if len(row.conditions) == 1 and not math.isnan(ours.get(row.conditions[0], math.nan))
     ]
-    return Table("calibration-levels", "Levels and model by condition", columns, rows)
+    if not is_of_the_paper(result.fleet) or not parts:
+        return ""
+    open_row = next(row for row in MODEL_4M if len(row.conditions) > 1)
+    text = f"The calibrated model beside the paper's own, as printed with its Fig. 16: {', '.join(parts)}"
+    text += f"; {open_row.level_db:g} dB is printed of condition {' or '.join(open_row.conditions)}."
+    fast = [ours.get(name, math.nan) for name in ("5", "6")]
+    if fast[1] >= fast[0]:
+        text += (
+            f" The paper's fall from condition 5 to 6 is not reproduced: the calibrated model has {fast[0]:.1f} and "
+            f"{fast[1]:.1f} dB there, since its meshing noise at constant torque rises with the speed."
+        )
+    return text
 
 
-def _figure(result: CampaignCalibration) -> Figure:
-    found = result.calibration
-    levels = sorted(found.levels, key=lambda level: level.datum.condition.train_speed_km_h)
-    speeds = np.array([level.datum.condition.train_speed_km_h for level in levels])
-    elements: list[Line | Markers] = []
-    for slot, origin in enumerate(dict.fromkeys(level.datum.origin for level in levels)):
-        held = np.array([level.datum.level_db if level.datum.origin == origin else math.nan for level in levels])
-        elements.append(Markers(speeds, held, f"level, {origin}", color=slot, symbol="diamond"))
-    before = np.array([level.before_db for level in levels])
-    after = np.array([level.predicted_db for level in levels])
-    elements.append(Line(speeds, before, "model before", color=7, style="dotted", points=True))
-    elements.append(Line(speeds, after, "model after", color=2, points=True))
-    return Figure(
-        "calibration-over-speed",
-        "Levels and model over the train's speed, before and after the calibration",
-        "One dot a condition; the lines between them only lead the eye.",
-        Axis("Train speed", "km/h"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
-        elements,
+def _told(found: Calibration) -> list[Block]:
+    number = found.condition_number
+    seen = (
+        f"The levels see {found.rank} of {len(found.moved)} directions among the parameters"
+        + ("" if number is None else f" (condition number of the Jacobian, columns of length one: {number:.3g})")
+        + f". Chi square is {found.chi_square:.3g} with {found.degrees_of_freedom} degrees of freedom."
     )
+    blocks: list[Block] = [Paragraph(seen)]
+    tables: list[Table | None] = [correlation_table(found), transfer_table(found), posterior_table(found)]
+    blocks += [table for table in tables if table is not None]
+    following = next_measurement_table(found)
+    if following is not None:
+        text = (
+            "To first order, one more level at a speed, torque and receiver would leave this part of each interval; of "
+            "a parameter that the data do not determine the bounds are taken as what is known."
+        )
+        blocks += [Paragraph(text), following]
+    return blocks

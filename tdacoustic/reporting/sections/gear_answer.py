@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from tdacoustic.drive import GearState
+import math
+
+from tdacoustic.drive import GearState, torque_at
+from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
-from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Sentences, Table
+from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.sections.gear_words import (
     by_speed,
     conditions_words,
@@ -30,7 +33,7 @@ from tdacoustic.reporting.sections.sound_field import sound_words
 from tdacoustic.reporting.sections.speed_sweep import sweep_words
 from tdacoustic.results import FleetPrediction
 
-__all__ = ["gear_answer", "regime_words"]
+__all__ = ["gear_answer", "gear_overview", "regime_words"]
 
 SCOPE = (
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
@@ -46,6 +49,16 @@ TERMS = (
 
 def gear_answer(result: FleetPrediction) -> list[Block]:
     """Return the summary: the regime, a sentence a condition, what holds over the conditions, then the doubts."""
+    doubts = [Notice("warning", sentence(doubt)) for doubt in result.prediction.doubts]
+    return [*_said(result), *doubts, _table(result)]
+
+
+def gear_overview(result: FleetPrediction) -> Section:
+    """Return the section on all conditions: `gear_answer` without the doubts, for a report that has them elsewhere."""
+    return Section("model-conditions", "The drive by condition", [*_said(result), _table(result)])
+
+
+def _said(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
     blocks: list[Block] = [
         Paragraph(f"{regime_words(result)} {SCOPE}"),
@@ -54,11 +67,7 @@ def gear_answer(result: FleetPrediction) -> list[Block]:
     if any(state.masuda_db is not None for state in states):
         blocks.append(Paragraph(f"{TERMS} {reading_words(result.fleet)}"))
     over = [sentence(text) for text in _over_conditions(result) if text]
-    if over:
-        blocks.append(Sentences(over))
-    blocks += [Notice("warning", sentence(doubt)) for doubt in result.prediction.doubts]
-    blocks.append(_table(result))
-    return blocks
+    return [*blocks, Sentences(over)] if over else blocks
 
 
 def regime_words(result: FleetPrediction) -> str:
@@ -72,9 +81,21 @@ def regime_words(result: FleetPrediction) -> str:
     else:
         powers = sorted(1e-3 * state.condition.power_w for state in states)
         ends = list(dict.fromkeys((significant(powers[0]), significant(powers[-1]))))
-        text = f"Regime: {mode}, {torque} of one motor, {law_words(fleet)} ({' to '.join(ends)} kW). "
+        text = f"Regime: {mode}, {torque} of one motor, {_law_words(result)} ({' to '.join(ends)} kW). "
         text += _sign_words(states)
     return f"{text} {_of_the_test(result)}".strip()
+
+
+def _law_words(result: FleetPrediction) -> str:
+    """How the torques follow from the speed, where it is the fleet's law that gives them."""
+    fleet, conditions = result.fleet, [state.condition for state in result.prediction.conditions]
+    stated = "as the runs state it"
+    try:
+        of_law = [torque_at(fleet, condition.train_speed_km_h) for condition in conditions]
+    except FleetError:
+        return stated
+    held = [math.isclose(c.torque_n_m, law, rel_tol=1e-9) for c, law in zip(conditions, of_law, strict=True)]
+    return law_words(fleet) if all(held) else f"{law_words(fleet)} or {stated}" if any(held) else stated
 
 
 def _sign_words(states: tuple[GearState, ...]) -> str:

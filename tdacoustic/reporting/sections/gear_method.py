@@ -6,12 +6,12 @@ from tdacoustic.gears import SteadyState
 from tdacoustic.gears.harmonic_balance import FEWEST_HARMONICS, RESIDUAL, TAIL
 from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, RECORD_PERIODS, SETTLED
 from tdacoustic.gears.sweep import SWEEP_PERIODS
-from tdacoustic.reporting.document import Block, Column, Facts, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.document import Paragraph, Section, Sentences
 from tdacoustic.reporting.sections.printed import PAPER
-from tdacoustic.reporting.sections.provenance import steps_of
+from tdacoustic.reporting.sections.provenance import inputs_of, steps_of, versions_of
 from tdacoustic.results import FleetPrediction
 
-__all__ = ["gear_method"]
+__all__ = ["gear_method", "method_sections"]
 
 EQUATIONS = (
     "The gears are two rigid bodies on linear springs and dampers, coupled by one mesh with a gap (equations (1) to "
@@ -21,20 +21,21 @@ EQUATIONS = (
 
 def gear_method(result: FleetPrediction) -> Section:
     """Return the section on method and provenance."""
-    blocks: list[Block] = [
-        Section("gear-method", "Method", [Paragraph(_method(result))]),
-        Section("gear-assumptions", "Assumptions", [Sentences(_assumptions(result))]),
-        Section("gear-input", "Input", [_input(result)]),
+    blocks = [
+        *method_sections(result),
+        Section("gear-input", "Input", inputs_of(result.inputs)),
+        *steps_of(result),
+        versions_of(result.versions),
     ]
-    if result.records:
-        blocks.append(steps_of(result))
-    blocks.append(Section("versions", "Versions", [Facts(list(result.versions.items()))]))
     return Section("provenance", "How the numbers came about", blocks)
 
 
-def _input(result: FleetPrediction) -> Table:
-    columns = (Column("file", "Fleet file"), Column("format", "Format"), Column("sha256", "SHA-256"))
-    return Table("inputs", "Input", columns, [(file.written, file.format, file.sha256) for file in result.inputs])
+def method_sections(result: FleetPrediction) -> list[Section]:
+    """Return the sections on method and assumptions of the gear model."""
+    return [
+        Section("gear-method", "Method of the model", [Paragraph(_method(result))]),
+        Section("gear-assumptions", "Assumptions of the model", [Sentences(_assumptions(result))]),
+    ]
 
 
 def _method(result: FleetPrediction) -> str:

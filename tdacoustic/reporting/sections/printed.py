@@ -11,10 +11,14 @@ from tdacoustic.fleet import Fleet
 __all__ = [
     "DTE_PP_UM",
     "FIGURE_11_CONDITION",
+    "LARGEST_ERROR_DB",
     "LEVEL_OF_TEXT_DB",
+    "MEASURED_4M",
+    "MODEL_4M",
     "PAPER",
     "TABLE_5",
     "Printed",
+    "PrintedLevel",
     "is_of_the_paper",
     "printed_of",
 ]
@@ -54,6 +58,31 @@ DTE_PP_UM: Final = 14.8491
 
 LEVEL_OF_TEXT_DB: Final = 86.517
 """Masuda's level of the same condition as section 4.3 has it; Table 5 has another."""
+
+
+class PrintedLevel(NamedTuple):
+    """A level at 4 m in section 5.1 of the paper.
+
+    Parameters
+    ----------
+    conditions : tuple of str
+        The one it is of; two where the text leaves it open.
+    level_db : float
+    """
+
+    conditions: tuple[str, ...]
+    level_db: float
+
+
+MODEL_4M: Final = (
+    PrintedLevel(("1",), 81.3),
+    PrintedLevel(("3",), 84.2),
+    PrintedLevel(("4", "5"), 88.0),
+    PrintedLevel(("6",), 77.3),
+)
+MEASURED_4M: Final = (PrintedLevel(("3",), 88.3),)
+LARGEST_ERROR_DB: Final = 4.1
+"""Levels of the paper's model and its measurement (Fig. 16); the largest difference of the two, in condition 3."""
 
 _SAME_MESH: Final = 0.01
 """Relative difference of mesh frequencies within which a condition is one of Table 5."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
-from tdacoustic.results import Analysis, FleetPrediction
+from collections.abc import Mapping, Sequence
 
-__all__ = ["ASSUMPTIONS", "provenance", "steps_of"]
+from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
+from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
+
+__all__ = ["ASSUMPTIONS", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
 
 ASSUMPTIONS = (
     "The channels' components, directions, distances and sensitivities are taken from the campaign file.",
@@ -17,35 +19,47 @@ ASSUMPTIONS = (
 
 def provenance(analysis: Analysis) -> Section:
     """Return the section on provenance."""
-    blocks: list[Block] = []
-    inputs = [(log.written, log.format, log.sha256) for log in analysis.inputs]
-    if inputs:
-        input_columns = (
-            Column("file", "Log"),
-            Column("format", "Format"),
-            Column("sha256", "SHA-256"),
-        )
-        blocks.append(Table("inputs", "Inputs", input_columns, inputs))
-    settings = [(key, _shown(value)) for key, value in analysis.settings.items()]
-    columns = (Column("setting", "Setting"), Column("value", "Value"))
-    blocks.append(Section("settings", "Settings", [Table("settings", "Settings in force", columns, settings)]))
-    blocks.append(Section("assumptions", "Assumptions", [Sentences(ASSUMPTIONS)]))
-    if analysis.records:
-        blocks.append(steps_of(analysis))
-    blocks.append(Section("versions", "Versions", [Facts(list(analysis.versions.items()))]))
+    blocks = [
+        *inputs_of(analysis.inputs),
+        settings_of(analysis.settings),
+        Section("assumptions", "Assumptions", [Sentences(ASSUMPTIONS)]),
+        *steps_of(analysis),
+        versions_of(analysis.versions),
+    ]
     return Section("provenance", "How the numbers came about", blocks)
+
+
+def inputs_of(files: Sequence[LogInput]) -> list[Block]:
+    """Return the table of the files that went in; nothing of none."""
+    columns = (Column("file", "File"), Column("format", "Format"), Column("sha256", "SHA-256"))
+    rows = [(file.written, file.format, file.sha256) for file in files]
+    return [Table("inputs", "Inputs", columns, rows)] if rows else []
+
+
+def settings_of(settings: Mapping[str, object]) -> Section:
+    """Return the section on settings, by key."""
+    columns = (Column("setting", "Setting"), Column("value", "Value"))
+    rows = [(key, _shown(value)) for key, value in settings.items()]
+    return Section("settings", "Settings", [Table("settings", "Settings in force", columns, rows)])
+
+
+def versions_of(versions: Mapping[str, str]) -> Section:
+    """Return the section on the versions of what made the numbers."""
+    return Section("versions", "Versions", [Facts(list(versions.items()))])
 
 
 def _shown(value: object) -> str:
     if value is None:
         return "default"
-    if isinstance(value, tuple):
-        return ", ".join(f"{item:g}" if isinstance(item, float) else str(item) for item in value) or "none"
+    if isinstance(value, tuple | list):
+        return ", ".join(_shown(item) for item in value) or "none"
+    if isinstance(value, Mapping):
+        return " ".join(f"{key} = {_shown(item)}" for key, item in value.items())
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def steps_of(result: Analysis | FleetPrediction) -> Details:
-    """Return the steps of a result, folded away."""
+def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]:
+    """Return the steps of a result, folded away; nothing of none."""
     rows = [
         (record.label, record.title, record.step, record.version, key[:16], ", ".join(v[:23] for _, v in record.inputs))
         for key, record in result.records
@@ -58,4 +72,5 @@ def steps_of(result: Analysis | FleetPrediction) -> Details:
         Column("key", "Key"),
         Column("inputs", "Made from"),
     )
-    return Details(f"{len(rows)} steps", [Table("steps", "Steps and what they were made from", columns, rows)])
+    table = Table("steps", "Steps and what they were made from", columns, rows)
+    return [Details(f"{len(rows)} steps", [table])] if rows else []

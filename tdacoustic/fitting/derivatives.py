@@ -1,0 +1,48 @@
+"""Derivatives of weighted residuals by the parameters that a fit moves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.fitting.loss import Residuals
+from tdacoustic.fitting.parameters import FreeParameter, lmfit_parameters, values_of
+
+__all__ = ["STEP", "jacobian_of", "with_expressions"]
+
+Real = NDArray[np.float64]
+
+STEP: Final = 1e-5
+"""Of the differences, relative: for models that are exact to the last digits; others state theirs."""
+
+
+def jacobian_of(
+    weighted: Residuals, parameters: Sequence[FreeParameter], values: dict[str, float], relative_step: float = STEP
+) -> Real:
+    """Central differences on the scale of the fit; one-sided at a bound."""
+    moved = [parameter for parameter in parameters if parameter.is_moved]
+    columns = []
+    for parameter in moved:
+        place = parameter.inner(values[parameter.name])
+        size = parameter.width if math.isfinite(parameter.width) else abs(place)
+        step = relative_step * (size or 1e-3)
+        low, high = parameter.inner(parameter.low), parameter.inner(parameter.high)
+        below, above = max(place - step, low), min(place + step, high)
+        sides = []
+        for side in (below, above):
+            shifted = {**values, parameter.name: parameter.outer(side)}
+            sides.append(weighted(with_expressions(parameters, shifted)))
+        columns.append((sides[1] - sides[0]) / (above - below))
+    return np.stack(columns, axis=1) if columns else np.zeros((weighted(values).size, 0))
+
+
+def with_expressions(parameters: Sequence[FreeParameter], values: dict[str, float]) -> dict[str, float]:
+    """Return values in which those that follow from others by an expression fit them again."""
+    if all(parameter.is_moved for parameter in parameters):
+        return values
+    inner = {p.name: p.inner(values[p.name]) for p in parameters if p.is_moved}
+    return values_of(parameters, lmfit_parameters(parameters, inner))

@@ -1,0 +1,120 @@
+"""Which measurement would tell most about the parameters, before it is made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.drive import Condition, Receiver
+from tdacoustic.fitting.levels import OFFSET, SILENCE_DB, LevelModel, MeasuredLevel
+from tdacoustic.fitting.optimum import Fit
+from tdacoustic.fitting.parameters import FreeParameter
+
+__all__ = ["Candidate", "NextMeasurement", "next_measurements"]
+
+Real = NDArray[np.float64]
+
+_STEP: Final = 1e-3
+_OPEN: Final = 100.0
+"""Standard error on the scale of the fit of a parameter of which nothing is known, and which has no bounds."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A measurement that could be made.
+
+    Parameters
+    ----------
+    condition : Condition
+    receiver : Receiver
+    sigma_db : float
+        One standard deviation of its level.
+    """
+
+    condition: Condition
+    receiver: Receiver
+    sigma_db: float
+
+
+@dataclass(frozen=True)
+class NextMeasurement:
+    """What a measurement is expected to do to the intervals.
+
+    Parameters
+    ----------
+    condition : Condition
+    receiver : Receiver
+    expected_db : float
+        Level that the model expects.
+    remaining : dict of str to float
+        By parameter: length of its interval after the measurement over that before it; level offsets of campaigns
+        are left out.
+    """
+
+    condition: Condition
+    receiver: Receiver
+    expected_db: float
+    remaining: dict[str, float]
+
+    @property
+    def mean_remaining(self) -> float:
+        """Geometric mean of `remaining`: what the search goes by."""
+        return math.exp(sum(math.log(part) for part in self.remaining.values()) / len(self.remaining))
+
+
+def next_measurements(
+    model: LevelModel, found: Fit, candidates: Sequence[Candidate], model_sigma_db: float
+) -> tuple[NextMeasurement, ...]:
+    """Return what each candidate would tell, the most telling first.
+
+    To first order: the information of one more level is added to that of the data. Of a parameter that the data do not
+    determine the bounds are taken as what is known (a uniform spread between them).
+
+    Parameters
+    ----------
+    model : LevelModel
+    found : Fit
+    candidates : sequence of Candidate
+        Those where the model is silent are left out.
+    model_sigma_db : float
+    """
+    moved = found.moved
+    if not moved or not candidates:
+        return ()
+    empty = [MeasuredLevel(c.condition, c.receiver, 0.0, c.sigma_db, "Z", "", "") for c in candidates]
+    asked = LevelModel(model.fleet, empty)
+    levels = asked.levels_db(found.values)
+    slopes = np.stack([_slope(asked, found, parameter) for parameter in moved], axis=1)
+    known = found.jacobian.T @ found.jacobian + np.diag([_within_bounds(parameter) ** -2.0 for parameter in moved])
+    before = np.sqrt(np.diag(np.linalg.inv(known)))
+    results = []
+    for candidate, level, slope in zip(candidates, levels, slopes, strict=True):
+        if level <= SILENCE_DB:
+            continue
+        seen = slope / math.hypot(candidate.sigma_db, model_sigma_db)
+        after = np.sqrt(np.diag(np.linalg.inv(known + np.outer(seen, seen))))
+        parts = zip(moved, after / before, strict=True)
+        remaining = {p.name: float(part) for p, part in parts if not p.name.startswith(OFFSET)}
+        results.append(NextMeasurement(candidate.condition, candidate.receiver, float(level), remaining))
+    return tuple(sorted(results, key=lambda result: result.mean_remaining))
+
+
+def _slope(asked: LevelModel, found: Fit, parameter: FreeParameter) -> Real:
+    """Change of each candidate's level with a parameter on the scale of the fit."""
+    place = parameter.inner(found.values[parameter.name])
+    step = _STEP * (parameter.width if math.isfinite(parameter.width) else max(abs(place), 1.0))
+    low = max(place - step, parameter.inner(parameter.low))
+    high = min(place + step, parameter.inner(parameter.high))
+    inner = {p.name: p.inner(found.values[p.name]) for p in found.moved}
+    below, above = (asked.levels_db(found.at({**inner, parameter.name: side})) for side in (low, high))
+    return np.asarray((above - below) / (high - low))
+
+
+def _within_bounds(parameter: FreeParameter) -> float:
+    """Standard deviation of what is known without data: a uniform spread within the bounds."""
+    return parameter.width / math.sqrt(12.0) if math.isfinite(parameter.width) else _OPEN

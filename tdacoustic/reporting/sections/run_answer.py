@@ -1,0 +1,138 @@
+"""The answer of the main job first: who dominates, how the model fits, what it predicts, and what speaks against it."""
+
+from __future__ import annotations
+
+import math
+
+from tdacoustic.drive import GearState
+from tdacoustic.reporting.document import Block, Notice, Section, Sentences
+from tdacoustic.reporting.sections.answer import conditions_answer, verdicts_answer
+from tdacoustic.reporting.sections.calibration import calibration_answer
+from tdacoustic.reporting.sections.gear_words import (
+    by_speed,
+    conditions_words,
+    hertz,
+    largest_line,
+    newtons,
+    sentence,
+    state_words,
+)
+from tdacoustic.reporting.sections.words import joined
+from tdacoustic.results import CampaignResult, FleetPrediction
+
+__all__ = ["calibration_line", "prediction_line", "run_answer"]
+
+MOST_LEVELS = 8
+"""Conditions whose levels are all named in a sentence; of more the slowest and the fastest are."""
+
+
+def run_answer(result: CampaignResult) -> list[Block]:
+    """Return the summary: all in a few lines, then sources, fit and prediction with what speaks against them."""
+    short = [line for line in (_dominance_line(result), calibration_line(result), prediction_line(result)) if line]
+    blocks: list[Block] = [Sentences(short)] if short else []
+    blocks.append(Section("answer-sources", "Which source dominates", conditions_answer(result.analysis)))
+    if result.calibration is not None:
+        blocks.append(Section("answer-fit", "How the model fits", calibration_answer(result.calibration)))
+    not_done = [Notice("warning", sentence(text)) for text in result.not_done]
+    if result.prediction is not None:
+        said: list[Block] = [*not_done, *_new_doubts(result)]
+        words = _predicted_words(result.prediction)
+        said = [Sentences(words), *said] if words else said
+        blocks.append(Section("answer-prediction", "What the model predicts", said))
+    elif not_done:
+        blocks.append(Section("answer-not-done", "What is not done", not_done))
+    verdicts = verdicts_answer(result.analysis)
+    return [*blocks, Section("answer-verdicts", "The verdicts side by side", verdicts)] if verdicts else blocks
+
+
+def calibration_line(result: CampaignResult) -> str:
+    """Return the calibration in a line of text; empty without one."""
+    if result.calibration is None:
+        return ""
+    found = result.calibration.calibration
+    values = [f"{p.key} {p.initial:.4g} to {p.value:.4g}" for p in found.parameters]
+    errors = [(level.before_db - level.datum.level_db, level.error_db) for level in found.levels]
+    before, after = (math.hypot(*side) / math.sqrt(len(errors)) for side in zip(*errors, strict=True))
+    misfit = f"levels off by {before:.1f} dB rms before, {after:.1f} dB after"
+    doubts = f"{len(found.doubts)} doubt{'s' if len(found.doubts) != 1 else ''}"
+    return f"Calibration: {', '.join(values)}; {misfit}; {doubts}."
+
+
+def prediction_line(result: CampaignResult) -> str:
+    """Return the prediction in a line of text; empty without one."""
+    if result.prediction is None:
+        return ""
+    levels = _level_words(result.prediction)
+    return f"Prediction with {_which(result)}: {levels or 'no sound'}."
+
+
+def _dominance_line(result: CampaignResult) -> str:
+    """Who dominates where; empty where no source is named."""
+    named: dict[str, list[str]] = {}
+    for verdict in result.analysis.dominance:
+        named.setdefault(verdict.dominant, []).append(verdict.condition)
+    undecided = named.pop("undecided", [])
+    if not named:
+        return ""
+    parts = [f"the {source} dominates the noise lines in {_conditions(names)}" for source, names in named.items()]
+    parts += [f"undecided in {_conditions(undecided)}"] if undecided else []
+    of_sound = [100.0 * v.line_fraction for v in result.analysis.dominance if v.line_fraction is not None]
+    ends = list(dict.fromkeys(f"{end:.0f}" for end in (min(of_sound), max(of_sound)))) if of_sound else []
+    parts += [f"these lines are {' to '.join(ends)} % of the sound energy"] if ends else []
+    return sentence("; ".join(parts))
+
+
+def _conditions(names: list[str]) -> str:
+    return f"condition{'s' if len(names) > 1 else ''} {joined(names)}"
+
+
+def _predicted_words(found: FleetPrediction) -> list[str]:
+    """The prediction in a few sentences, without its levels."""
+    forces = [
+        (line[2], f"{newtons(line[2])} at {hertz(line[3])} in {state_words(state)}, {line[0]}, {line[1]}")
+        for state in found.prediction.conditions
+        if (line := largest_line(state)) is not None
+    ]
+    words = [louder] if (louder := _louder_words(found)) else []
+    return [*words, f"The largest bearing force is {max(forces)[1]}."] if forces else words
+
+
+def _which(result: CampaignResult) -> str:
+    return "the fleet as it is" if result.calibration is None else "the calibrated fleet"
+
+
+def _total_db(found: FleetPrediction, state: GearState, path: str = "total") -> float | None:
+    sound = found.prediction.sound_of(state.condition.name)
+    return None if sound is None else sound.level_db(found.prediction.surface, path)
+
+
+def _level_words(found: FleetPrediction) -> str:
+    """Levels on the surface by speed; empty where nothing sounds."""
+    levels = [
+        f"{level:.1f} dB in condition {state.condition.name} ({state.condition.train_speed_km_h:.4g} km/h)"
+        for state in by_speed(found.prediction.conditions)
+        if (level := _total_db(found, state)) is not None
+    ]
+    if not levels:
+        return ""
+    shown = ", ".join(levels) if len(levels) <= MOST_LEVELS else f"{levels[0]} to {levels[-1]}"
+    return f"at {found.prediction.surface} {shown}"
+
+
+def _louder_words(found: FleetPrediction) -> str:
+    """Which of motor and meshing noise is the louder one, by condition; one that is not there is silent."""
+    held: dict[str, list[GearState]] = {"motor": [], "mesh": []}
+    for state in by_speed(found.prediction.conditions):
+        levels = {path: level for path in held if (level := _total_db(found, state, path)) is not None}
+        if levels:
+            held[max(levels, key=levels.__getitem__)].append(state)
+    names = {"motor": "the motor's tones", "mesh": "the meshing noise"}
+    parts = [f"{names[path]} in {conditions_words(states)}" for path, states in held.items() if states]
+    return sentence(f"the louder part is {', '.join(parts)}") if parts else ""
+
+
+def _new_doubts(result: CampaignResult) -> list[Notice]:
+    """Doubts of the prediction that the calibration has not said."""
+    said = () if result.calibration is None else result.calibration.calibration.doubts
+    found = () if result.prediction is None else result.prediction.prediction.doubts
+    return [Notice("warning", sentence(doubt)) for doubt in found if doubt not in said]
