@@ -117,6 +117,7 @@ def _stated(campaign: Campaign, conditions: Mapping[str, Condition]) -> tuple[li
     from tdacoustic.fitting.levels import MeasuredLevel
 
     found, doubts = [], []
+    standing = "measured" if campaign.origin == "measured" else "printed"  # a synthetic campaign makes no levels
     for known in campaign.levels:
         if known.weighting == "C":
             doubts.append(f"the C-weighted level of condition {known.condition} is not used")
@@ -130,7 +131,7 @@ def _stated(campaign: Campaign, conditions: Mapping[str, Condition]) -> tuple[li
                     level_db=known.level_db,
                     sigma_db=STATED_SIGMA_DB if known.sigma_db is None else known.sigma_db,
                     weighting=known.weighting,
-                    origin="printed",
+                    origin=standing,
                     source=known.origin or "stated in the campaign",
                 )
             )
