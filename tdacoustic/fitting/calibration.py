@@ -12,23 +12,35 @@ import numpy as np
 from tdacoustic.errors import FittingError
 from tdacoustic.fitting.calibrated import Calibration, FittedLevel, FittedParameter, LeftOut
 from tdacoustic.fitting.doubts import (
+    ON_A_BOUND,
     doubts_of_data,
+    doubts_of_failures,
     doubts_of_fleet,
+    doubts_of_levels,
     doubts_of_posterior,
+    doubts_of_scatter,
     doubts_of_transfer,
     doubts_of_values,
+    is_blind,
 )
 from tdacoustic.fitting.free import free_parameter
 from tdacoustic.fitting.intervals import ProfileInterval, profile_intervals
 from tdacoustic.fitting.least_squares import fit
-from tdacoustic.fitting.levels import OFFSET, SILENCE_DB, LevelModel, MeasuredLevel
-from tdacoustic.fitting.loss import cost_of, with_priors
+from tdacoustic.fitting.levels import (
+    LEVELS_OF_CALIBRATION,
+    OFFSET,
+    SILENCE_DB,
+    LevelModel,
+    MeasuredLevel,
+    fingerprint,
+)
+from tdacoustic.fitting.loss import Objective
 from tdacoustic.fitting.next_measurement import Candidate, next_measurements
 from tdacoustic.fitting.optimum import Fit
-from tdacoustic.fitting.parameters import FreeParameter
+from tdacoustic.fitting.parameters import FreeParameter, lmfit_parameters, values_of
 from tdacoustic.fitting.posterior import sample_posterior
 from tdacoustic.fitting.residuals import LevelResiduals
-from tdacoustic.fitting.scatter import fitted_model_sigma_db
+from tdacoustic.fitting.scatter import FittedScatter, fitted_scatter
 from tdacoustic.fitting.settings import MODEL_SIGMA_DB, FitSettings
 from tdacoustic.fitting.transfer import Transferred
 from tdacoustic.fleet import Fleet
@@ -55,6 +67,7 @@ def calibrate_fleet(
     model: LevelModel | None = None,
     candidates: Sequence[Candidate] = (),
     transferred: Sequence[Transferred] = (),
+    earlier: Fleet | None = None,
 ) -> Calibration:
     """Fit parameters of a fleet to measured levels.
 
@@ -74,35 +87,35 @@ def calibrate_fleet(
         Measurements that could be made next.
     transferred : sequence of Transferred
         What the priors in `free` were taken from, to be compared with what the data say without them.
+    earlier : Fleet, optional
+        The calibrated fleet that they come from.
 
     Raises
     ------
     FittingError
-        There are no data, or the model gives no level for any of them.
+        There are no data, the model gives no level for any of them, or it cannot be computed where the fit starts.
     """
     settings = settings or FitSettings()
     held, said = _heard(fleet, data)
     if model is None or len(held) != len(data):
         model = LevelModel(fleet, held)
+    _check_start(model, free)
     interpolated_db = model.prepare(free)
-    sigma_db, doubts = _model_sigma_db(model, free, settings)
+    sigma_db, scatter, doubts = _model_sigma_db(model, free, settings)
     residuals = LevelResiduals(model, sigma_db)
     searched = fit(residuals, free, settings.starts, settings.loss, polish=False, resolution=RESOLUTION, step=STEP)
     found = searched if interpolated_db is None else _exactly(searched, residuals.exactly())
-    freedom = float(searched.n_free) if settings.model_sigma_db is None and not doubts else None
-    with_intervals = searched.covariance is not None
-    ci95 = profile_intervals(residuals, searched, 0.95, freedom) if with_intervals else {}
-    ci68 = profile_intervals(residuals, searched, 0.68, freedom) if with_intervals else {}
-    parameters = tuple(_fitted(parameter, found, ci95, ci68) for parameter in free)
+    freedom = None if scatter is None else float(scatter.freedom)
+    intervals = [profile_intervals(residuals, searched, level, freedom) for level in (0.95, 0.68)]
+    parameters = tuple(_fitted(parameter, found, *intervals) for parameter in free)
     levels = _levels(model, residuals, found)
     groups = dict.fromkeys(datum.group for datum in model.data)
     left_out = tuple(_left_out(model, group, searched, sigma_db) for group in groups)
-    posterior = None if settings.posterior is None else sample_posterior(residuals, searched, settings.posterior)
-    compared = tuple(_compared(held, residuals, searched) for held in transferred)
-    of_fleet = {name: value for name, value in found.values.items() if "." in name and not name.startswith(OFFSET)}
-    errors = {p.key: p.stderr for p in parameters if p.stderr is not None and p.key in of_fleet}
+    sampled = settings.posterior if searched.moved else None
+    posterior = None if sampled is None else sample_posterior(residuals, searched, sampled)
+    compared = _compared(transferred, residuals, searched)
     return Calibration(
-        fleet.replaced(of_fleet, stderr=errors, origin=origin),
+        _calibrated_fleet(fleet, residuals, found, parameters, origin),
         parameters,
         levels,
         left_out,
@@ -116,19 +129,44 @@ def calibrate_fleet(
         interpolated_db,
         model.sounds({}),
         model.sounds(found.values),
-        next_measurements(model, found, candidates, sigma_db),
+        next_measurements(residuals, found, candidates),
         posterior,
         compared,
         (
             *said,
             *doubts,
+            *doubts_of_scatter(scatter),
+            *doubts_of_levels(model.data, earlier),
             *doubts_of_values(residuals, searched, parameters),
-            *doubts_of_data(levels, left_out, found),
+            *doubts_of_data(levels, left_out, residuals, searched),
             *doubts_of_fleet(fleet),
+            *doubts_of_failures(model.failures),
             *doubts_of_posterior(posterior),
             *doubts_of_transfer(compared),
         ),
     )
+
+
+def _check_start(model: LevelModel, free: Sequence[FreeParameter]) -> None:
+    """Raise for values to start from with which the model cannot be computed."""
+    start = values_of(free, lmfit_parameters(free))
+    if not np.isfinite(model.levels_db(start)).all():
+        shown = ", ".join(f"{name} {value:.4g}" for name, value in start.items())
+        why = f": {model.failures[-1]}" if model.failures else ""
+        raise FittingError(f"{model.fleet.path}: the model cannot be computed where the fit starts ({shown}){why}")
+
+
+def _calibrated_fleet(
+    fleet: Fleet, residuals: LevelResiduals, found: Fit, parameters: Sequence[FittedParameter], origin: str
+) -> Fleet:
+    """The fleet with what the data have changed in it, and with fingerprints of these data."""
+    blind = {parameter.name for parameter in found.moved if is_blind(residuals, found, parameter)}
+    keys = [p.key for p in parameters if "." in p.key and not p.key.startswith(OFFSET) and p.key not in blind]
+    errors = {p.key: p.stderr for p in parameters if p.stderr is not None and p.key in keys}
+    made = fleet.replaced({key: found.values[key] for key in keys}, stderr=errors, origin=origin)
+    prints = ", ".join(sorted({fingerprint(datum) for datum in residuals.model.data}))
+    meta = dict(fleet.meta) | {LEVELS_OF_CALIBRATION: prints}
+    return replace(made, meta=tuple(meta.items()))
 
 
 def _heard(fleet: Fleet, data: Sequence[MeasuredLevel]) -> tuple[list[MeasuredLevel], list[str]]:
@@ -159,31 +197,38 @@ def _heard(fleet: Fleet, data: Sequence[MeasuredLevel]) -> tuple[list[MeasuredLe
     return [datum for datum, level in zip(data, levels, strict=True) if level > SILENCE_DB], said
 
 
-def _model_sigma_db(model: LevelModel, free: Sequence[FreeParameter], settings: FitSettings) -> tuple[float, list[str]]:
+def _model_sigma_db(
+    model: LevelModel, free: Sequence[FreeParameter], settings: FitSettings
+) -> tuple[float, FittedScatter | None, list[str]]:
     if settings.model_sigma_db is not None:
-        return settings.model_sigma_db, []
+        return settings.model_sigma_db, None, []
     try:
-        return fitted_model_sigma_db(model, free, settings.starts, settings.loss), []
+        found = fitted_scatter(model, free, settings.starts)
     except FittingError as error:
-        return MODEL_SIGMA_DB, [f"the model's scatter cannot be fitted: {error}; {MODEL_SIGMA_DB:g} dB are assumed"]
+        return (
+            MODEL_SIGMA_DB,
+            None,
+            [f"the model's scatter cannot be fitted: {error}; {MODEL_SIGMA_DB:g} dB are assumed"],
+        )
+    return found.sigma_db, found, []
 
 
 def _exactly(searched: Fit, residuals: LevelResiduals) -> Fit:
     """Return the optimum of the computed levels, next to that of the interpolated ones, whose slopes serve."""
-    weighted = with_priors(residuals, searched.parameters)
+    objective = Objective(residuals, searched.parameters, searched.loss)
     moved, values = searched.moved, searched.values
-    chi_square = cost_of(weighted(values), searched.loss)
+    chi_square = objective.cost(values)
     if searched.loss == "linear" and moved:
         scale = np.linalg.norm(searched.jacobian, axis=0)
         for _ in range(_EXACT_STEPS):
             columns = searched.jacobian / np.where(scale > 0.0, scale, 1.0)
-            step = np.linalg.lstsq(columns, -weighted(values), rcond=RESOLUTION)[0]
+            step = np.linalg.lstsq(columns, -objective.rows(values), rcond=RESOLUTION)[0]
             inner = {
                 p.name: min(max(p.inner(values[p.name]) + float(d / s), p.inner(p.low)), p.inner(p.high))
                 for p, d, s in zip(moved, step, np.where(scale > 0.0, scale, math.inf), strict=True)
             }
             trial = searched.at(inner)
-            reached = cost_of(weighted(trial))
+            reached = objective.cost(trial)
             if not reached < chi_square:
                 break
             chi_square, values = reached, trial
@@ -199,12 +244,25 @@ def _fitted(parameter: FreeParameter, found: Fit, ci95: Intervals, ci68: Interva
     stderr = None if errors is None else errors.get(name)
     if not parameter.is_moved:
         stderr = found.error_of(lambda values: values[name])
+    elif _is_on_a_bound(parameter, value) or ci95.get(name) == (None, None) or _is_wide(parameter, found):
+        stderr = None  # a curvature there is no deviation
     prior = parameter.prior
     if prior is not None and parameter.scale == "log":
         prior = (math.exp(prior[0]), math.exp(prior[0]) * prior[1])
     bounds = parameter.low, parameter.high
     intervals = ci95.get(name), ci68.get(name)
     return FittedParameter(name, value, parameter.initial, *bounds, stderr, *intervals, prior, parameter.expression)
+
+
+def _is_wide(parameter: FreeParameter, found: Fit) -> bool:
+    """Whether a standard error is longer than the bounds are apart."""
+    return (found.inner_errors() or {}).get(parameter.name, 0.0) > parameter.width
+
+
+def _is_on_a_bound(parameter: FreeParameter, value: float) -> bool:
+    place = parameter.inner(value)
+    near = min(place - parameter.inner(parameter.low), parameter.inner(parameter.high) - place)
+    return math.isfinite(near) and near <= ON_A_BOUND * parameter.width
 
 
 def _levels(model: LevelModel, residuals: LevelResiduals, found: Fit) -> tuple[FittedLevel, ...]:
@@ -227,26 +285,29 @@ def _left_out(model: LevelModel, group: str, found: Fit, model_sigma_db: float) 
     spread = again.error_of(mean_level)
     own = math.sqrt(float(np.mean([model.data[row].sigma_db ** 2 for row in rows])) / len(rows))
     sigma_db = None if spread is None else math.hypot(spread, own, model_sigma_db)
-    return LeftOut(group, mean_level(again.values) - measured, sigma_db)
+    error_db = mean_level(again.values) - measured
+    return LeftOut(group, error_db, sigma_db) if math.isfinite(error_db) else LeftOut(group, None)
 
 
 def _mean_level(model: LevelModel, rows: Sequence[int]) -> Callable[[Mapping[str, float]], float]:
     return lambda values: float(model.levels_db(values)[list(rows)].mean())
 
 
-def _compared(held: Transferred, residuals: LevelResiduals, found: Fit) -> Transferred:
-    """What the data say of a transferred parameter where it alone has lost its prior."""
+def _compared(transferred: Sequence[Transferred], residuals: LevelResiduals, found: Fit) -> tuple[Transferred, ...]:
+    """What the data say of the transferred parameters without what was carried over."""
+    if not transferred:
+        return ()
+    keys = {held.key for held in transferred}
     started = [
-        replace(p.starting_at(found.values[p.name]), prior=None if p.name == held.key else p.prior)
+        replace(p.starting_at(found.values[p.name]), prior=None if p.name in keys else p.prior)
         for p in found.parameters
     ]
     alone = fit(residuals, started, 4, found.loss, polish=False, resolution=RESOLUTION, step=STEP)
-    errors = alone.standard_errors()
-    if errors is None:
-        return held
-    parameter = next(p for p in found.parameters if p.name == held.key)
-    place = parameter.inner(alone.values[held.key])
-    near = min(place - parameter.inner(parameter.low), parameter.inner(parameter.high) - place)
-    if math.isfinite(near) and near <= 1e-4 * parameter.width:
-        return held
-    return replace(held, alone=alone.values[held.key], alone_stderr=errors[held.key])
+    errors = alone.standard_errors() or {}
+    by_name = {parameter.name: parameter for parameter in alone.parameters}
+    return tuple(
+        replace(held, alone=alone.values[held.key], alone_stderr=errors[held.key])
+        if held.key in errors and not _is_on_a_bound(by_name[held.key], alone.values[held.key])
+        else held
+        for held in transferred
+    )

@@ -23,21 +23,27 @@ STEP: Final = 1e-5
 def jacobian_of(
     weighted: Residuals, parameters: Sequence[FreeParameter], values: dict[str, float], relative_step: float = STEP
 ) -> Real:
-    """Central differences on the scale of the fit; one-sided at a bound."""
+    """Return central differences on the scale of the fit, shape (residuals, moved).
+
+    One-sided at a bound and beside values for which there are no residuals; zero where these are on both sides.
+    """
     moved = [parameter for parameter in parameters if parameter.is_moved]
-    columns = []
+    columns: list[Real] = []
+    here = weighted(values)
     for parameter in moved:
         place = parameter.inner(values[parameter.name])
         size = parameter.width if math.isfinite(parameter.width) else abs(place)
         step = relative_step * (size or 1e-3)
         low, high = parameter.inner(parameter.low), parameter.inner(parameter.high)
         below, above = max(place - step, low), min(place + step, high)
-        sides = []
+        found = []
         for side in (below, above):
             shifted = {**values, parameter.name: parameter.outer(side)}
-            sides.append(weighted(with_expressions(parameters, shifted)))
-        columns.append((sides[1] - sides[0]) / (above - below))
-    return np.stack(columns, axis=1) if columns else np.zeros((weighted(values).size, 0))
+            rows = weighted(with_expressions(parameters, shifted))
+            found.append((side, rows) if np.isfinite(rows).all() else (place, here))
+        (first, low_rows), (second, high_rows) = found
+        columns.append((high_rows - low_rows) / (second - first) if second > first else np.zeros_like(here))
+    return np.stack(columns, axis=1) if columns else np.zeros((here.size, 0))
 
 
 def with_expressions(parameters: Sequence[FreeParameter], values: dict[str, float]) -> dict[str, float]:

@@ -10,15 +10,27 @@ from typing import Final
 import numpy as np
 
 from tdacoustic.fitting.calibrated import FittedLevel, FittedParameter, LeftOut
-from tdacoustic.fitting.loss import cost_of, with_priors
+from tdacoustic.fitting.levels import LEVELS_OF_CALIBRATION, MeasuredLevel, fingerprint
+from tdacoustic.fitting.loss import Objective
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.posterior import Posterior
 from tdacoustic.fitting.residuals import LevelResiduals, same_state
+from tdacoustic.fitting.scatter import LARGEST_DB, FittedScatter
 from tdacoustic.fitting.transfer import Transferred
 from tdacoustic.fleet import Fleet
 
-__all__ = ["doubts_of_data", "doubts_of_fleet", "doubts_of_posterior", "doubts_of_transfer", "doubts_of_values"]
+__all__ = [
+    "doubts_of_data",
+    "doubts_of_failures",
+    "doubts_of_fleet",
+    "doubts_of_levels",
+    "doubts_of_posterior",
+    "doubts_of_scatter",
+    "doubts_of_transfer",
+    "doubts_of_values",
+    "is_blind",
+]
 
 CORRELATED: Final = 0.95
 OUTLYING: Final = 2.5
@@ -30,6 +42,9 @@ UNREACHED: Final = 0.01
 ON_A_BOUND: Final = 1e-4
 UNSEEN: Final = 0.1
 """Largest change of a weighted residual, over the whole bounds, up to which the data are blind to a parameter."""
+
+FEW: Final = 20
+"""Degrees of freedom below which a fitted scatter is doubtful [assumed]."""
 
 AS_WELL: Final = 4.0
 BARRIER: Final = 0.1
@@ -43,12 +58,15 @@ def doubts_of_values(residuals: LevelResiduals, found: Fit, parameters: tuple[Fi
             f"the data see {found.rank} of {len(found.moved)} directions among the parameters: these cannot all be "
             "determined"
         )
-    blind = [parameter for parameter in found.moved if _is_blind(residuals, found, parameter)]
+    blind = [parameter for parameter in found.moved if is_blind(residuals, found, parameter)]
     for parameter in blind:
         yield f"{parameter.name} changes none of the levels: the data cannot see it"
     fitted = {parameter.key: parameter for parameter in parameters}
     for parameter in found.moved:
         yield from _of_interval(parameter, fitted[parameter.name])
+    undetermined = [name for name, held in fitted.items() if held.expression is None and held.ci95 is None]
+    if undetermined and found.is_left_open:
+        yield f"no interval can be given for {', '.join(undetermined)}"
     correlation = found.correlation()
     if correlation is not None:
         for j, i in itertools.combinations(range(len(found.moved)), 2):
@@ -83,9 +101,25 @@ def _of_interval(parameter: FreeParameter, fitted: FittedParameter) -> Iterator[
         before = 2.0 * 1.96 * parameter.prior[1]
         if ends[1] - ends[0] > 0.95 * before:
             yield f"the interval of {parameter.name} is no narrower than its prior: the data add nothing to it"
+        yield from _of_prior(parameter, fitted)
 
 
-def _is_blind(residuals: LevelResiduals, found: Fit, parameter: FreeParameter) -> bool:
+def _of_prior(parameter: FreeParameter, fitted: FittedParameter) -> Iterator[str]:
+    """Say where the data pull a parameter out of its prior: the pull over its own standard deviation."""
+    if parameter.prior is None or fitted.stderr is None:
+        return
+    mean, sigma = parameter.prior
+    error = fitted.stderr / (fitted.value if parameter.scale == "log" else 1.0)
+    room = sigma**2 - error**2
+    pull = (parameter.inner(fitted.value) - mean) / math.sqrt(room) if room > 0.0 else 0.0
+    if abs(pull) > OUTLYING:
+        yield (
+            f"the data contradict the prior of {parameter.name}: they pull it {abs(pull):.1f} standard deviations away "
+            f"from {parameter.outer(mean):.4g}"
+        )
+
+
+def is_blind(residuals: LevelResiduals, found: Fit, parameter: FreeParameter) -> bool:
     """Whether all of the bounds, the other values staying, change next to nothing."""
     column = np.abs(found.jacobian[: found.n_data, found.moved.index(parameter)])
     reach = parameter.width if math.isfinite(parameter.width) else 10.0 * max(1.0, abs(found.values[parameter.name]))
@@ -100,23 +134,28 @@ def _is_blind(residuals: LevelResiduals, found: Fit, parameter: FreeParameter) -
 
 def _is_apart(residuals: LevelResiduals, found: Fit, values: dict[str, float]) -> bool:
     """Whether chi square rises between the optimum and other values; along a flat valley it does not."""
-    weighted = with_priors(residuals, found.parameters)
+    objective = Objective(residuals, found.parameters, found.loss)
     first = {p.name: p.inner(found.values[p.name]) for p in found.moved}
     second = {p.name: p.inner(values[p.name]) for p in found.moved}
-    higher = max(found.chi_square, cost_of(weighted(values), found.loss))
+    higher = max(found.chi_square, objective.cost(values))
     for part in np.linspace(0.1, 0.9, 9):
         between = {name: (1.0 - part) * first[name] + part * second[name] for name in first}
-        if cost_of(weighted(found.at(between)), found.loss) > higher + BARRIER:
+        if objective.cost(found.at(between)) > higher + BARRIER:
             return True
     return False
 
 
-def doubts_of_data(levels: Sequence[FittedLevel], left_out: Sequence[LeftOut], found: Fit) -> Iterator[str]:
+def doubts_of_data(
+    levels: Sequence[FittedLevel], left_out: Sequence[LeftOut], residuals: LevelResiduals, found: Fit
+) -> Iterator[str]:
     """Yield what is doubtful in the data, and in how the model meets them."""
     from scipy.stats import chi2
 
+    squares = float((residuals(found.values) ** 2).sum())  # plain ones: a robust loss hides what it leaves
+
     conditions = {(level.datum.campaign, level.datum.condition.name): level.datum for level in levels}
-    if len(conditions) == 1:
+    first_state = levels[0].datum.condition
+    if all(same_state(first_state, datum.condition) for datum in conditions.values()):
         yield "all data are of one condition: what depends on speed cannot be told from what does not"
     for first, second in itertools.combinations(conditions.values(), 2):
         if first.campaign == second.campaign and same_state(first.condition, second.condition):
@@ -124,7 +163,7 @@ def doubts_of_data(levels: Sequence[FittedLevel], left_out: Sequence[LeftOut], f
                 f"conditions {first.condition.name} and {second.condition.name} are the same to the model, in speed "
                 "and torque: they tell no more than one of them measured twice"
             )
-    if found.n_free >= 1 and chi2.sf(found.chi_square, found.n_free) < UNREACHED:
+    if found.n_free >= 1 and chi2.sf(squares, found.n_free) < UNREACHED:
         errors = [level.error_db for level in levels]
         rms = math.sqrt(sum(error**2 for error in errors) / len(errors))
         worst = max(levels, key=lambda level: abs(level.error_db))
@@ -151,6 +190,34 @@ def doubts_of_fleet(fleet: Fleet) -> Iterator[str]:
         )
 
 
+def doubts_of_scatter(scatter: FittedScatter | None) -> Iterator[str]:
+    """Yield what a fitted scatter of the model cannot hold."""
+    if scatter is None:
+        return
+    if scatter.sigma_db >= LARGEST_DB:
+        yield f"the model's scatter ended on its largest value, {LARGEST_DB:g} dB: the misfit has no end"
+    elif scatter.freedom < FEW:
+        yield (
+            f"the model's scatter of {scatter.sigma_db:.2g} dB is taken from a misfit with {scatter.freedom} degrees "
+            "of freedom: an error of the model that the parameters can absorb is not in it, and not in the intervals"
+        )
+
+
+def doubts_of_levels(data: Sequence[MeasuredLevel], earlier: Fleet | None) -> Iterator[str]:
+    """Yield where levels count twice: in two campaigns, or in the calibration that the priors come from."""
+    prints = [fingerprint(datum) for datum in data]
+    twice = len(prints) - len(set(prints))
+    if twice:
+        yield f"{twice} of {len(prints)} levels stand twice: they count as independent, and are not"
+    known = set() if earlier is None else set(dict(earlier.meta).get(LEVELS_OF_CALIBRATION, "").split(", ")) - {""}
+    again = sum(held in known for held in set(prints))
+    if again:
+        yield (
+            f"{again} of {len(prints)} levels are those that the earlier fleet was calibrated to: with its priors they "
+            "count twice"
+        )
+
+
 def doubts_of_posterior(posterior: Posterior | None) -> Iterator[str]:
     """Yield whether the sampling of the posterior was long enough."""
     if posterior is not None and not posterior.has_converged:
@@ -159,6 +226,16 @@ def doubts_of_posterior(posterior: Posterior | None) -> Iterator[str]:
         yield (
             f"the posterior has not converged: {posterior.steps} steps are {times:.0f} autocorrelation times of "
             f"{worst.key}, R-hat is {max(p.r_hat for p in posterior.parameters):.3f}; take more steps"
+        )
+
+
+def doubts_of_failures(failures: Sequence[str]) -> Iterator[str]:
+    """Yield whether the model could not be computed somewhere within the bounds."""
+    if failures:
+        places = f"{len(failures)} place{'s' if len(failures) > 1 else ''}"
+        yield (
+            f"at {places} of the search the model could not be computed, and intervals end before them; the first: "
+            f"{failures[0]}"
         )
 
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import keyword
 import math
 from typing import Final, Literal
 
-from tdacoustic.errors import FittingError
+from tdacoustic.errors import FittingError, FleetError
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fleet import Fleet
 
@@ -21,9 +22,10 @@ _BOUNDS: Final[dict[str, tuple[float, float, Scale]]] = {
     "gear_dynamics.bearing_damping_ratio": (0.005, 0.5, "log"),
 }
 """Bounds and scale of parameters that are often freed [assumed]; levels in dB get 40 dB to both sides, others a tenth
-to ten times their value."""
+to ten times their value, as far as a fleet file may have that."""
 
 _DECIBELS: Final = 40.0
+_HALVINGS: Final = 24
 
 
 def free_parameter(
@@ -59,15 +61,25 @@ def free_parameter(
     Raises
     ------
     FittingError
-        It is no single number, or zero without usual bounds, or bounds and values contradict each other.
+        It is no single number or a whole one, zero without bounds, or bounds and values contradict each other.
     """
     auxiliary = "." not in key
-    value = _value(fleet, key) if not auxiliary else initial
+    if auxiliary and (not key.isidentifier() or keyword.iskeyword(key)):
+        raise FittingError(f"{key!r} can be no name in an expression: letters, digits and _, first a letter")
+    value = initial if auxiliary else _value(fleet, key)
     if value is None:
         raise FittingError(f"{key} is no parameter of a fleet, and an auxiliary one needs a value to start from")
     start = value if initial is None else initial
+    stated = low is not None and high is not None
     unbounded: tuple[float, float, Scale] = (-math.inf, math.inf, "linear")
-    usual_low, usual_high, usual_scale = unbounded if auxiliary else _usual(fleet, key, value)
+    if expression is not None or auxiliary or (stated and scale is not None):
+        usual_low, usual_high, usual_scale = unbounded
+    elif stated:
+        assert low is not None
+        usual_low, usual_high, usual_scale = -math.inf, math.inf, "log" if min(low, start) > 0.0 else "linear"
+        usual_scale = _BOUNDS[key][2] if key in _BOUNDS else "linear" if _is_level(key) else usual_scale
+    else:
+        usual_low, usual_high, usual_scale = _usual(fleet, key, value)
     chosen = usual_scale if scale is None else scale
     lowest = min(usual_low, start) if low is None else low
     highest = max(usual_high, start) if high is None else high
@@ -81,20 +93,38 @@ def free_parameter(
 def _value(fleet: Fleet, key: str) -> float:
     value = fleet.value_of(key)
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise FittingError(f"{fleet.path}: {key} is no single number and cannot be freed")
-    return float(value)
+        raise FittingError(f"{key} is no single number and cannot be freed")
+    if isinstance(value, int):
+        raise FittingError(f"{key} is a whole number and cannot be freed")
+    return value
+
+
+def _is_level(key: str) -> bool:
+    return "_db" in key.rpartition(".")[2] or "_db." in key
 
 
 def _usual(fleet: Fleet, key: str, value: float) -> tuple[float, float, Scale]:
     if key in _BOUNDS:
         return _BOUNDS[key]
-    if "_db" in key.rpartition(".")[2] or "_db." in key:
+    if _is_level(key):
         return value - _DECIBELS, value + _DECIBELS, "linear"
     if value == 0.0:
-        raise FittingError(
-            f"{fleet.path}: {key} is 0: a parameter is freed from a tenth to ten times its value, and this one needs "
-            "bounds of its own"
-        )
-    if value < 0.0:
-        return 10.0 * value, 0.1 * value, "linear"
-    return 0.1 * value, 10.0 * value, "log"
+        raise FittingError(f"{key} is 0 and has no usual bounds: it needs min and max")
+    ends = _allowed(fleet, key, value, 0.1 * value), _allowed(fleet, key, value, 10.0 * value)
+    return min(ends), max(ends), "log" if value > 0.0 else "linear"
+
+
+def _allowed(fleet: Fleet, key: str, value: float, end: float) -> float:
+    """The end of the usual bounds, or the last value towards it that a fleet file may have."""
+    inside, outside = value, end
+    for _ in range(_HALVINGS):
+        try:
+            fleet.replaced({key: end})
+        except FleetError:
+            outside = end
+        else:
+            inside = end
+            if end == outside:
+                break
+        end = 0.5 * (inside + outside)
+    return inside

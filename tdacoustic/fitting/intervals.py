@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Final, TypeAlias
 
+import numpy as np
+
 from tdacoustic.fitting.least_squares import fit
 from tdacoustic.fitting.loss import Residuals
 from tdacoustic.fitting.optimum import Fit
@@ -14,6 +16,7 @@ __all__ = ["ProfileInterval", "profile_intervals", "quantile_of"]
 
 _STEPS: Final = 40
 _CLOSE: Final = 2e-3
+_NO_MODEL: Final = 1e30
 
 ProfileInterval: TypeAlias = tuple[float | None, float | None]
 """Lower and upper end; None where the bound comes before the end of the interval."""
@@ -43,7 +46,7 @@ def quantile_of(level: float, freedom: float | None = None) -> float:
 def profile_intervals(
     residuals: Residuals, found: Fit, level: float = 0.95, freedom: float | None = None
 ) -> dict[str, ProfileInterval]:
-    """Return the profile-likelihood interval of each moved parameter, in its own unit.
+    """Return the profile-likelihood interval of each moved parameter that is determined, in its own unit.
 
     An end is where the chi square, minimised over the other parameters, has risen by the square of the quantile (times
     the misfit's variance where the data's standard deviations are not known). Unlike a standard error it is right where
@@ -60,13 +63,14 @@ def profile_intervals(
     """
     scale = 1.0 if found.known_sigma or found.n_free < 1 else found.chi_square / found.n_free
     rise = quantile_of(level, freedom) ** 2 * scale
-    errors = found.inner_errors()
+    errors = found.inner_errors() or {}
     return {
         parameter.name: (
             _end(residuals, found, parameter, -1.0, rise, errors),
             _end(residuals, found, parameter, 1.0, rise, errors),
         )
         for parameter in found.moved
+        if parameter.name in errors
     }
 
 
@@ -76,14 +80,13 @@ def _end(
     parameter: FreeParameter,
     direction: float,
     rise: float,
-    errors: dict[str, float] | None,
+    errors: dict[str, float],
 ) -> float | None:
     from scipy.optimize import brentq
 
     best = parameter.inner(found.values[parameter.name])
     limit = parameter.inner(parameter.low if direction < 0.0 else parameter.high)
-    error = None if errors is None else errors[parameter.name]
-    step = error * math.sqrt(rise) if error else 0.1 * max(abs(best), 1.0)
+    step = errors[parameter.name] * math.sqrt(rise) or 0.1 * max(abs(best), 1.0)
 
     def above(place: float) -> float:
         """Zero at the end of the interval, and close to a straight line towards it."""
@@ -112,6 +115,8 @@ def _profile(residuals: Residuals, found: Fit, held: FreeParameter, place: float
     others = [
         p.fixed_at(value) if p.name == held.name else p.starting_at(found.values[p.name]) for p in found.parameters
     ]
+    if not np.isfinite(residuals({**found.values, held.name: value})).all():
+        return _NO_MODEL
     of_prior = 0.0 if held.prior is None else ((place - held.prior[0]) / held.prior[1]) ** 2
     again = fit(residuals, others, loss=found.loss, known_sigma=found.known_sigma, polish=False)
     return again.chi_square + of_prior

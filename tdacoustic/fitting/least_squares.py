@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Final
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FittingError
 from tdacoustic.fitting.derivatives import STEP, jacobian_of
-from tdacoustic.fitting.loss import Loss, Residuals, cost_of, finite, weight_of, with_priors
+from tdacoustic.fitting.loss import Loss, Objective, Residuals, finite
 from tdacoustic.fitting.optimum import RANK, Fit
 from tdacoustic.fitting.parameters import FreeParameter, lmfit_parameters, values_of
 from tdacoustic.fitting.starts import best_starts, spread_starts
@@ -22,6 +23,15 @@ if TYPE_CHECKING:
 __all__ = ["fit"]
 
 Real = NDArray[np.float64]
+
+Optimum: TypeAlias = tuple[float, dict[str, float]]
+"""Chi square, or what a loss makes of it, and the values."""
+
+BETTER: Final = 1e-6
+"""Relative difference of chi square from which one optimum is better than another."""
+
+NOTHING: Final = 1e-9
+"""Change of weighted residuals that is round-off."""
 
 SAME_MINIMUM: Final = 0.05
 """Distance of two optima over the bounds (or the values) below which they are one."""
@@ -69,19 +79,66 @@ def fit(
         Nothing can be fitted: a residual that is no number at the start, or fewer residuals than the fit can use.
     """
     held = tuple(parameters)
-    weighted = with_priors(residuals, held)
+    objective = Objective(residuals, held, loss)
     n_data = _checked(residuals, held)
-    begun = best_starts(weighted, held, spread_starts(held, starts, seed), loss)
-    optima = [_minimised(weighted, held, start, loss, polish) for start in begun]
-    optima = sorted((found for found in optima if math.isfinite(found[0])), key=lambda found: found[0])
+    begun = best_starts(objective, held, spread_starts(held, starts, seed))
+    unseen = _unseen(objective, held, begun[:2]) if starts > 1 else frozenset()
+    searched = tuple(replace(p, fixed=True, prior=None) if p.name in unseen else p for p in held)
+    begun = [{**start, **{name: begun[0][name] for name in unseen}} for start in begun]
+    optima = [_minimised(objective, searched, start, polish) for start in begun]
+    optima = [found for found in optima if math.isfinite(found[0])]
     if not optima:
         raise FittingError("no start of the fit ended in an optimum")
-    best = optima[0]
-    jacobian = jacobian_of(weighted, held, best[1], step)
+    ranked = _ranked(optima)
+    best = ranked[0]
+    jacobian = jacobian_of(objective.rows, held, best[1], step)
     if loss != "linear":
-        jacobian = jacobian * np.sqrt(weight_of(weighted(best[1]), loss))[:, None]
-    others = _distinct(held, optima)
+        jacobian = jacobian * np.sqrt(objective.weights(objective.rows(best[1])))[:, None]
+    jacobian[:, [p.name in unseen for p in held if p.is_moved]] = 0.0  # but for round-off it is
+    others = _distinct(held, ranked)
     return Fit(held, best[1], best[0], n_data, jacobian, others, known_sigma, loss, resolution)
+
+
+def _unseen(
+    objective: Objective, parameters: tuple[FreeParameter, ...], starts: list[dict[str, float]]
+) -> frozenset[str]:
+    """Names of parameters that change nothing between their bounds, seen from some starts.
+
+    Round-off must not move them.
+    """
+    found = set()
+    for parameter in parameters:
+        if not parameter.is_moved or parameter.prior is not None or not math.isfinite(parameter.width):
+            continue
+        ends = parameter.inner(parameter.low), parameter.inner(parameter.high)
+        changes = []
+        for start in starts:
+            rows = [
+                finite(
+                    objective.rows(values_of(parameters, lmfit_parameters(parameters, {**start, parameter.name: end})))
+                )
+                for end in ends
+            ]
+            changes.append(float(np.abs(rows[1] - rows[0]).max(initial=0.0)))
+            if changes[-1] <= NOTHING:  # a curve could come back to where it was
+                middle = {**start, parameter.name: 0.5 * (ends[0] + ends[1])}
+                between = finite(objective.rows(values_of(parameters, lmfit_parameters(parameters, middle))))
+                changes[-1] = float(np.abs(between - rows[0]).max(initial=0.0))
+        if max(changes) <= NOTHING:
+            found.add(parameter.name)
+    return frozenset(found)
+
+
+def _ranked(optima: list[Optimum]) -> list[Optimum]:
+    """Optima by their cost; that of the initial values first where no other is better by more than round-off.
+
+    What the data do not see then stays where it was.
+    """
+    first = optima[0]
+    ranked = sorted(optima, key=lambda found: found[0])
+    if ranked[0][0] < first[0] - BETTER * (1.0 + first[0]):
+        return ranked
+    return [first, *(found for found in ranked if found is not first)]
 
 
 def _checked(residuals: Residuals, parameters: tuple[FreeParameter, ...]) -> int:
@@ -94,8 +151,8 @@ def _checked(residuals: Residuals, parameters: tuple[FreeParameter, ...]) -> int
 
 
 def _minimised(
-    weighted: Residuals, parameters: tuple[FreeParameter, ...], start: dict[str, float], loss: Loss, polish: bool
-) -> tuple[float, dict[str, float]]:
+    objective: Objective, parameters: tuple[FreeParameter, ...], start: dict[str, float], polish: bool
+) -> Optimum:
     """Return chi square and values of the optimum that a start ends in.
 
     Bounds and robust losses go to the trust-region method; without them Levenberg and Marquardt's is tried too.
@@ -105,40 +162,39 @@ def _minimised(
     made = lmfit_parameters(parameters, start)
 
     def residual(found: lmfit.Parameters) -> Real:
-        return finite(weighted(values_of(parameters, found)))
+        return finite(objective.rows(values_of(parameters, found)))
 
     if not any(parameter.is_moved for parameter in parameters):
-        return cost_of(residual(made), loss), values_of(parameters, made)
+        values = values_of(parameters, made)
+        return objective.cost(values), values
     close = 1e-8 if _has_bounds(parameters) else 1e-12  # what is bounded is costly, and polished afterwards
-    options: dict[str, Any] = {"xtol": close, "ftol": close, "gtol": close, "calc_covar": False}
+    options: dict[str, Any] = {"xtol": close, "ftol": close, "gtol": close, "calc_covar": False, "x_scale": "jac"}
     with np.errstate(invalid="ignore", divide="ignore"):  # of a singular covariance, which is not lmfit's to judge
-        ends = [lmfit.minimize(residual, made, method="least_squares", loss=loss, x_scale="jac", **options)]
+        ends = [lmfit.minimize(residual, made, method="least_squares", loss=objective.scipy_loss, **options)]
     moved = sum(parameter.is_moved for parameter in parameters)
-    if loss == "linear" and residual(made).size >= moved and not _has_bounds(parameters):
+    if objective.loss == "linear" and residual(made).size >= moved and not _has_bounds(parameters):
         ends.append(lmfit.minimize(residual, made, method="leastsq", xtol=1e-14, ftol=1e-14, calc_covar=False))
     found = [values_of(parameters, end.params) for end in ends]
-    optima = [(cost_of(weighted(values), loss), values) for values in found]
+    optima = [(objective.cost(values), values) for values in found]
     best = min(optima, key=lambda optimum: optimum[0])
-    return _polished(weighted, parameters, best) if loss == "linear" and polish else best
+    return _polished(objective, parameters, best) if objective.loss == "linear" and polish else best
 
 
-def _polished(
-    weighted: Residuals, parameters: tuple[FreeParameter, ...], optimum: tuple[float, dict[str, float]]
-) -> tuple[float, dict[str, float]]:
+def _polished(objective: Objective, parameters: tuple[FreeParameter, ...], optimum: Optimum) -> Optimum:
     """Take Gauss-Newton steps with central differences, which carry more digits than those of the search."""
     moved = [parameter for parameter in parameters if parameter.is_moved]
     for _ in range(_POLISHING):
         chi_square, values = optimum
-        jacobian = jacobian_of(weighted, parameters, values)
+        jacobian = jacobian_of(objective.rows, parameters, values)
         norms = np.linalg.norm(jacobian, axis=0)
         if not np.isfinite(jacobian).all() or not norms.all():
             break
-        step = np.linalg.lstsq(jacobian / norms, -weighted(values), rcond=RANK)[0] / norms
+        step = np.linalg.lstsq(jacobian / norms, -objective.rows(values), rcond=RANK)[0] / norms
         inner = {p.name: p.inner(values[p.name]) + float(d) for p, d in zip(moved, step, strict=True)}
         if any(not p.inner(p.low) <= inner[p.name] <= p.inner(p.high) for p in moved):
             break
         trial = values_of(parameters, lmfit_parameters(parameters, inner))
-        reached = cost_of(weighted(trial))
+        reached = objective.cost(trial)
         if not reached <= chi_square * (1.0 + 1e-13):
             break
         optimum = (reached, trial)
@@ -151,9 +207,7 @@ def _has_bounds(parameters: tuple[FreeParameter, ...]) -> bool:
     return any(p.is_moved and (math.isfinite(p.inner(p.low)) or math.isfinite(p.inner(p.high))) for p in parameters)
 
 
-def _distinct(
-    parameters: tuple[FreeParameter, ...], optima: list[tuple[float, dict[str, float]]]
-) -> tuple[tuple[float, dict[str, float]], ...]:
+def _distinct(parameters: tuple[FreeParameter, ...], optima: list[Optimum]) -> tuple[Optimum, ...]:
     kept = [optima[0]]
     for found in optima[1:]:
         if all(_apart(parameters, found[1], other[1]) for other in kept):

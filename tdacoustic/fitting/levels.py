@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver, SoundSource
-from tdacoustic.errors import FittingError
+from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver, SoundSource, torque_at
+from tdacoustic.errors import FittingError, FleetError, TdacousticError
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.response import Response, response_of
-from tdacoustic.fleet import Fleet
+from tdacoustic.fleet import Fleet, Kinematics
 from tdacoustic.radiation import overall_level_db
 
-__all__ = ["OFFSET", "SILENCE_DB", "LevelModel", "MeasuredLevel", "offset_name"]
+__all__ = [
+    "LEVELS_OF_CALIBRATION",
+    "OFFSET",
+    "SILENCE_DB",
+    "LevelModel",
+    "MeasuredLevel",
+    "fingerprint",
+    "offset_name",
+]
 
 Real = NDArray[np.float64]
 
@@ -33,14 +42,26 @@ OF_GEARS: Final = ("gear_dynamics.", "masuda.")
 GAINS: Final[Mapping[str, str]] = {"masuda.constant_db": "gears", "model.motor_gain_db": "motor"}
 """Parameters that add to the level of a path as they stand: nothing is computed anew for them."""
 
+LEVELS_OF_CALIBRATION: Final = "levels_of_calibration"
+"""Key in ``[meta]`` of a calibrated fleet: fingerprints of the levels that it was calibrated to."""
+
 OFFSET: Final = "level_offset_db"
 SILENCE_DB: Final = -200.0
+SMALLEST_SIGMA_DB: Final = 1e-3
 
 Motion: TypeAlias = tuple[float, float]
 """Peak-to-peak transmission error and static compression in m: all that the meshing noise depends on."""
 
 Values: TypeAlias = Mapping[str, float]
 Key: TypeAlias = tuple[tuple[str, float], ...]
+
+
+def fingerprint(datum: MeasuredLevel) -> str:
+    """Return a short hash of what was measured, where and at which speed and torque; names do not count."""
+    state = f"{datum.condition.motor_hz:.6g} {datum.condition.torque_n_m:.6g}"
+    place = f"{datum.receiver.distance_m:.6g} {datum.receiver.position_m}"
+    text = f"{state} {place} {datum.what} {datum.weighting} {datum.level_db:.6g}"
+    return hashlib.sha256(text.encode()).hexdigest()[:12]
 
 
 def offset_name(campaign: str) -> str:
@@ -58,7 +79,7 @@ class MeasuredLevel:
     receiver : Receiver
     level_db : float
     sigma_db : float
-        One standard deviation of the measurement, above zero.
+        One standard deviation of the measurement, at least 0.001.
     weighting : {"Z", "A"}
     origin : {"measured", "synthetic", "printed"}
     source : str
@@ -91,9 +112,10 @@ class MeasuredLevel:
     campaign: str = ""
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.sigma_db) and self.sigma_db > 0.0):
+        if not (math.isfinite(self.sigma_db) and self.sigma_db >= SMALLEST_SIGMA_DB):
             raise FittingError(
-                f"condition {self.condition.name}: the level's standard deviation must be > 0 dB, got {self.sigma_db!r}"
+                f"condition {self.condition.name}: the level's standard deviation must be > 0 dB "
+                f"(at least {SMALLEST_SIGMA_DB:g}), got {self.sigma_db!r}"
             )
         if not math.isfinite(self.level_db):
             raise FittingError(f"condition {self.condition.name}: the level must be a number, got {self.level_db!r}")
@@ -116,18 +138,21 @@ class _Computed:
     motions: dict[Key, tuple[GearUnit, tuple[Motion, ...]]] = field(default_factory=dict)
     parts: dict[tuple[str, Key], Real] = field(default_factory=dict)
     responses: dict[tuple[FreeParameter, ...], Response | None] = field(default_factory=dict)
+    failures: list[str] = field(default_factory=list)
 
 
 class LevelModel:
     """The levels of a fleet's model at measured places, as a function of some of its parameters.
 
     What the gears do is kept for parameters that it was computed for, so that those which only change the sound cost
-    nothing. `prepare` interpolates over one or two parameters of the gears.
+    nothing. `prepare` interpolates over one or two parameters of the gears. Values for which the model cannot be
+    computed give NaN, and `failures` says why.
 
     Parameters
     ----------
     fleet : Fleet
     data : sequence of MeasuredLevel
+        Speed or torque of a condition that are those of the fleet's kinematics or torque law follow these.
     """
 
     def __init__(self, fleet: Fleet, data: Sequence[MeasuredLevel]) -> None:
@@ -153,8 +178,13 @@ class LevelModel:
         made._computed, made._response = self._computed, self._response
         return made
 
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """Why the model could not be computed somewhere, one line a place."""
+        return tuple(self._computed.failures)
+
     def levels_db(self, values: Values, exact: bool = False) -> Real:
-        """Return the total level for each datum, shape (n,); silence is -200 dB.
+        """Return the total level for each datum, shape (n,); silence is -200 dB, NaN what cannot be computed.
 
         Parameters
         ----------
@@ -176,9 +206,10 @@ class LevelModel:
         fleet = self._fleet(values)
         unit, motions = self._motion(fleet, values)
         model = DriveModel(fleet, unit)
+        held = zip(self.conditions, self._conditions(fleet, values), motions, strict=True)
         return tuple(
-            model.sound(condition, model.masuda_db(condition, *motion), self._receivers(condition))
-            for condition, motion in zip(self.conditions, motions, strict=True)
+            model.sound(condition, model.masuda_db(condition, *motion), self._receivers(known))
+            for known, condition, motion in held
         )
 
     def prepare(self, free: Sequence[FreeParameter]) -> float | None:
@@ -220,29 +251,43 @@ class LevelModel:
         key = (part, tuple(sorted(kept.items())))
         found = self._computed.parts.get(key)
         if found is None:
-            found = self._computed.parts[key] = self._heard(part, kept)
+            try:
+                found = self._heard(part, kept)
+            except TdacousticError as error:
+                if not kept:
+                    raise
+                self._computed.failures.append(str(error).removeprefix(f"{self.fleet.path}: "))
+                found = np.full(len(self.data), math.nan)
             found.flags.writeable = False
+            self._computed.parts[key] = found
         return found
 
     def _heard(self, part: Literal["motor", "gears"], values: Values) -> Real:
         fleet = self._fleet(values)
-        if part == "motor" and not any(name.startswith(DYNAMIC) for name in values):
-            model = DriveModel(fleet, self._motion(self.fleet, {})[0])
-            sources = {condition: model.motor_sources(condition) for condition in self.conditions}
+        conditions = self._conditions(fleet, values)
+        if part == "motor":
+            of_gears = any(name.startswith(DYNAMIC) for name in values)
+            model = DriveModel(fleet, None if of_gears else self._motion(self.fleet, {})[0])
+            found = [model.motor_sources(condition) for condition in conditions]
         else:
             unit, motions = self._motion(fleet, values)
             model = DriveModel(fleet, unit)
-            of: Callable[[Condition, Motion], tuple[SoundSource, ...]] = (
-                (lambda condition, motion: model.motor_sources(condition))
-                if part == "motor"
-                else lambda condition, motion: model.gear_sources(condition, model.masuda_db(condition, *motion))
-            )
-            sources = {c: of(c, motion) for c, motion in zip(self.conditions, motions, strict=True)}
+            found = [
+                model.gear_sources(condition, model.masuda_db(condition, *motion))
+                for condition, motion in zip(conditions, motions, strict=True)
+            ]
+        sources = dict(zip(self.conditions, found, strict=True))
         return np.array([_level_db(model, sources[datum.condition], datum) for datum in self.data])
 
     def _fleet(self, values: Values) -> Fleet:
         of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
         return self.fleet.replaced(of_fleet) if of_fleet else self.fleet
+
+    def _conditions(self, fleet: Fleet, values: Values) -> tuple[Condition, ...]:
+        """The conditions with the speed and torque that a changed fleet gives them, where it gave them before."""
+        if not any(name.startswith(("train.", "operation.", "gear_pair.")) for name in values):
+            return self.conditions
+        return tuple(_followed(condition, self.fleet, fleet) for condition in self.conditions)
 
     def _receivers(self, condition: Condition) -> tuple[Receiver, ...]:
         return tuple(dict.fromkeys(datum.receiver for datum in self.data if datum.condition == condition))
@@ -252,9 +297,21 @@ class LevelModel:
         known = self._computed.motions
         if key not in known:
             model = DriveModel(fleet)
-            states = [model.motion(condition) for condition in self.conditions]
+            states = [model.motion(condition) for condition in self._conditions(fleet, values)]
             known[key] = (model.unit, tuple((state.dte_pp_m, state.static_compression_m) for state in states))
         return known[key]
+
+
+def _followed(condition: Condition, before: Fleet, after: Fleet) -> Condition:
+    speed = condition.train_speed_km_h
+    motor_hz, torque_n_m = condition.motor_hz, condition.torque_n_m
+    if math.isclose(Kinematics.of(before).motor_hz_at_km_h(speed), motor_hz, rel_tol=1e-9):
+        motor_hz = Kinematics.of(after).motor_hz_at_km_h(speed)
+    try:
+        of_law = math.isclose(torque_at(before, speed), torque_n_m, rel_tol=1e-9)
+    except FleetError:  # there is no law: the runs state their torques
+        of_law = False
+    return replace(condition, motor_hz=motor_hz, torque_n_m=torque_at(after, speed) if of_law else torque_n_m)
 
 
 def _level_db(model: DriveModel, sources: Sequence[SoundSource], datum: MeasuredLevel) -> float:

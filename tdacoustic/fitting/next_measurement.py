@@ -14,12 +14,16 @@ from tdacoustic.drive import Condition, Receiver
 from tdacoustic.fitting.levels import OFFSET, SILENCE_DB, LevelModel, MeasuredLevel
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
+from tdacoustic.fitting.residuals import LevelResiduals, shared
 
 __all__ = ["Candidate", "NextMeasurement", "next_measurements"]
 
 Real = NDArray[np.float64]
 
 _STEP: Final = 1e-3
+_ALIKE: Final = 3
+"""Decimals of what remains of the intervals within which candidates tell alike."""
+
 _OPEN: Final = 100.0
 """Standard error on the scale of the fit of a parameter of which nothing is known, and which has no bounds."""
 
@@ -68,40 +72,49 @@ class NextMeasurement:
 
 
 def next_measurements(
-    model: LevelModel, found: Fit, candidates: Sequence[Candidate], model_sigma_db: float
+    residuals: LevelResiduals, found: Fit, candidates: Sequence[Candidate]
 ) -> tuple[NextMeasurement, ...]:
-    """Return what each candidate would tell, the most telling first.
+    """Return what each candidate would tell, the most telling first; of those that tell alike, the slowest.
 
-    To first order: the information of one more level is added to that of the data. Of a parameter that the data do not
-    determine the bounds are taken as what is known (a uniform spread between them).
+    To first order: the information of one more level is added to that of the data; at a speed and torque that is
+    measured already it shares what the model is off by there. Of a parameter that the data do not determine the bounds
+    are taken as what is known (a uniform spread between them).
 
     Parameters
     ----------
-    model : LevelModel
+    residuals : LevelResiduals
+        Of the data of the fit.
     found : Fit
     candidates : sequence of Candidate
         Those where the model is silent are left out.
-    model_sigma_db : float
     """
     moved = found.moved
-    if not moved or not candidates:
+    if not candidates or all(p.name.startswith(OFFSET) for p in moved):
         return ()
-    empty = [MeasuredLevel(c.condition, c.receiver, 0.0, c.sigma_db, "Z", "", "") for c in candidates]
-    asked = LevelModel(model.fleet, empty)
-    levels = asked.levels_db(found.values)
-    slopes = np.stack([_slope(asked, found, parameter) for parameter in moved], axis=1)
-    known = found.jacobian.T @ found.jacobian + np.diag([_within_bounds(parameter) ** -2.0 for parameter in moved])
+    model, sigma_db = residuals.model, residuals.model_sigma_db
+    asked = [MeasuredLevel(c.condition, c.receiver, 0.0, c.sigma_db, "Z", "", "") for c in candidates]
+    new = LevelModel(model.fleet, asked)
+    levels = new.levels_db(found.values)
+    slopes = np.stack([_slope(new, found, parameter) for parameter in moved], axis=1)
+    of_data = residuals.unweighted(found.jacobian[: found.n_data])
+    of_priors = found.jacobian[found.n_data :]
+    bounds = np.diag([_within_bounds(parameter) ** -2.0 for parameter in moved])
+    known = of_data.T @ np.linalg.solve(residuals.covariance, of_data) + of_priors.T @ of_priors + bounds
     before = np.sqrt(np.diag(np.linalg.inv(known)))
+    data = [model.data[row] for row in residuals.rows]
+    together = sigma_db**2 * shared(data, asked)
     results = []
-    for candidate, level, slope in zip(candidates, levels, slopes, strict=True):
-        if level <= SILENCE_DB:
+    for index, (datum, level) in enumerate(zip(asked, levels, strict=True)):
+        if not level > SILENCE_DB:
             continue
-        seen = slope / math.hypot(candidate.sigma_db, model_sigma_db)
+        carried = np.linalg.solve(residuals.covariance, together[:, index])
+        variance = datum.sigma_db**2 + sigma_db**2 - float(together[:, index] @ carried)
+        seen = (slopes[index] - carried @ of_data) / math.sqrt(variance)
         after = np.sqrt(np.diag(np.linalg.inv(known + np.outer(seen, seen))))
         parts = zip(moved, after / before, strict=True)
         remaining = {p.name: float(part) for p, part in parts if not p.name.startswith(OFFSET)}
-        results.append(NextMeasurement(candidate.condition, candidate.receiver, float(level), remaining))
-    return tuple(sorted(results, key=lambda result: result.mean_remaining))
+        results.append(NextMeasurement(datum.condition, datum.receiver, float(level), remaining))
+    return tuple(sorted(results, key=lambda r: (round(r.mean_remaining, _ALIKE), r.condition.train_speed_km_h)))
 
 
 def _slope(asked: LevelModel, found: Fit, parameter: FreeParameter) -> Real:
@@ -112,7 +125,8 @@ def _slope(asked: LevelModel, found: Fit, parameter: FreeParameter) -> Real:
     high = min(place + step, parameter.inner(parameter.high))
     inner = {p.name: p.inner(found.values[p.name]) for p in found.moved}
     below, above = (asked.levels_db(found.at({**inner, parameter.name: side})) for side in (low, high))
-    return np.asarray((above - below) / (high - low))
+    slope = (above - below) / (high - low)
+    return np.where(np.isfinite(slope), slope, 0.0)  # beside values for which there is no model, nothing is promised
 
 
 def _within_bounds(parameter: FreeParameter) -> float:

@@ -22,6 +22,9 @@ RANK: Final = 1e-10
 """Singular value of the Jacobian, its columns of length one, over the largest, below which a direction is not seen: for
 models that are exact to the last digits; others state theirs."""
 
+_IN_THE_BLIND: Final = 1e-3
+"""Part that a parameter has in a direction that nothing determines from which it is not determined either."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -99,21 +102,37 @@ class Fit:
 
     @property
     def covariance(self) -> Real | None:
-        """Of the moved parameters on the scale of the fit; None where it cannot be had."""
+        """Of the moved parameters on the scale of the fit; NaN for those that nothing determines.
+
+        None where that is all of them, or where errors are to be scaled with a misfit that has no degrees of freedom.
+        """
         if not self.moved:
             return np.zeros((0, 0))
+        seen = self._seen
+        if seen is None or (not self.known_sigma and self.n_free < 1):
+            return None
+        covariance, blind = seen
+        undetermined = np.abs(blind).max(axis=0, initial=0.0) > _IN_THE_BLIND
+        if undetermined.all():
+            return None
+        covariance = covariance * (1.0 if self.known_sigma else self.chi_square / self.n_free)
+        covariance[undetermined, :] = np.nan
+        covariance[:, undetermined] = np.nan
+        return covariance
+
+    @property
+    def _seen(self) -> tuple[Real, Real] | None:
+        """Covariance within what data and priors see, and the directions that they do not, shape (blind, moved)."""
+        if not np.isfinite(self.jacobian).all():
+            return None
         norms = np.linalg.norm(self.jacobian, axis=0)
-        if not np.isfinite(self.jacobian).all() or not norms.all():
-            return None
-        _, values, directions = np.linalg.svd(self.jacobian / norms, full_matrices=False)
-        if len(values) < len(self.moved) or values[-1] <= self.resolution * values[0]:
-            return None
-        scale = 1.0
-        if not self.known_sigma:
-            if self.n_free < 1:
-                return None
-            scale = self.chi_square / self.n_free
-        return np.asarray(scale * (directions.T / values**2) @ directions / np.outer(norms, norms))
+        norms = np.where(norms > 0.0, norms, 1.0)
+        _, values, directions = np.linalg.svd(self.jacobian / norms, full_matrices=True)
+        values = np.concatenate([values, np.zeros(len(directions) - len(values))])
+        held = values > self.resolution * max(float(values.max(initial=0.0)), 1e-300)
+        within = directions[held]
+        covariance = (within.T / values[held] ** 2) @ within / np.outer(norms, norms)
+        return np.asarray(covariance), np.asarray(directions[~held])
 
     def at(self, inner: Mapping[str, float]) -> dict[str, float]:
         """Return all values where the moved parameters stand at a place on the scale of the fit, expressions too."""
@@ -121,29 +140,39 @@ class Fit:
         return with_expressions(self.parameters, {**self.values, **moved})
 
     def inner_errors(self) -> dict[str, float] | None:
-        """Standard errors on the scale of the fit by name; None where they cannot be had."""
+        """Standard errors on the scale of the fit, by name, of what is determined; None where nothing is."""
         covariance = self.covariance
         if covariance is None:
             return None
-        return {p.name: math.sqrt(max(c, 0.0)) for p, c in zip(self.moved, np.diag(covariance), strict=True)}
+        diagonal = zip(self.moved, np.diag(covariance), strict=True)
+        return {p.name: math.sqrt(max(c, 0.0)) for p, c in diagonal if not math.isnan(c)}
 
     def standard_errors(self) -> dict[str, float] | None:
         """Standard errors in the values' own units, by name; of a logarithmic parameter to first order."""
         errors = self.inner_errors()
         if errors is None:
             return None
-        return {p.name: errors[p.name] * (self.values[p.name] if p.scale == "log" else 1.0) for p in self.moved}
+        scales = {p.name: self.values[p.name] if p.scale == "log" else 1.0 for p in self.moved}
+        return {name: error * scales[name] for name, error in errors.items()}
 
     def error_of(self, function: Callable[[Mapping[str, float]], float]) -> float | None:
         """Standard error of a number that depends on the values, to first order; None where it cannot be had."""
-        covariance = self.covariance
-        if covariance is None:
+        seen = self._seen
+        if seen is None or (not self.known_sigma and self.n_free < 1):
             return None
+        covariance, blind = seen
         slopes = jacobian_of(lambda values: np.array([function(values)]), self.parameters, self.values, 1e-3)[0]
-        return math.sqrt(max(float(slopes @ covariance @ slopes), 0.0))
+        if not np.isfinite(slopes).all():
+            return None
+        norms = np.linalg.norm(self.jacobian, axis=0)
+        scaled = slopes / np.where(norms > 0.0, norms, 1.0)
+        if np.abs(blind @ scaled).max(initial=0.0) > _IN_THE_BLIND * max(float(np.linalg.norm(scaled)), 1e-300):
+            return None
+        scale = 1.0 if self.known_sigma else self.chi_square / self.n_free
+        return math.sqrt(max(scale * float(slopes @ covariance @ slopes), 0.0))
 
     def correlation(self) -> Real | None:
-        """Correlation of the moved parameters; None where it cannot be had."""
+        """Correlation of the moved parameters, NaN for those that nothing determines; None where there is none."""
         covariance = self.covariance
         if covariance is None:
             return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -65,9 +66,10 @@ class FreeParameter:
             )
         if self.prior is not None and not self.prior[1] > 0.0:
             raise FittingError(f"{self.name}: the prior's standard deviation must be > 0, got {self.prior[1]:g}")
-        if self.scale == "log" and not (self.initial > 0.0 and self.low >= 0.0):
+        unbounded = self.expression is not None and self.low == -math.inf
+        if self.scale == "log" and not (self.initial > 0.0 and (self.low > 0.0 or unbounded)):
             raise FittingError(
-                f'{self.name}: scale = "log" needs values above 0, got {self.initial:g} from {self.low:g}'
+                f'{self.name}: scale = "log" needs values and bounds above 0, got {self.initial:g} from {self.low:g}'
             )
 
     @property
@@ -140,12 +142,40 @@ def lmfit_parameters(parameters: Sequence[FreeParameter], inner: Mapping[str, fl
         made.add(_symbol(parameter.name), value, vary=not parameter.fixed, min=low, max=high)
     for parameter in parameters:
         if parameter.expression is not None:
-            try:
-                made[_symbol(parameter.name)].expr = _expression(parameter, parameters)
-                float(made[_symbol(parameter.name)].value)
-            except Exception as error:  # asteval raises whatever the expression raises
-                raise FittingError(f"{parameter.name}: expression {parameter.expression!r}: {error}") from error
+            _check_circle(parameter, parameters)
+    for parameter in parameters:
+        if parameter.expression is not None:
+            _express(made, parameter, parameters)
     return made
+
+
+def _check_circle(parameter: FreeParameter, parameters: Sequence[FreeParameter]) -> None:
+    """Raise where an expression leads back to its own parameter."""
+    seen: set[str] = set()
+    waiting = [parameter]
+    while waiting:
+        text = str(waiting.pop().expression)
+        for other in parameters:
+            if re.search(rf"(?<![\w.]){re.escape(other.name)}(?![\w.])", text) and other.name not in seen:
+                if other.name == parameter.name:
+                    raise FittingError(
+                        f"{parameter.name}: expression {parameter.expression!r} leads back to the parameter itself"
+                    )
+                seen.add(other.name)
+                waiting += [other] if other.expression is not None else []
+
+
+def _express(made: Any, parameter: FreeParameter, parameters: Sequence[FreeParameter]) -> None:
+    where = f"{parameter.name}: expression {parameter.expression!r}"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of asteval, about what is raised or checked below
+            made[_symbol(parameter.name)].expr = _expression(parameter, parameters)
+            value = float(made[_symbol(parameter.name)].value)
+    except Exception as error:  # asteval raises whatever the expression raises
+        raise FittingError(f"{where}: {str(error).strip() or 'is no expression'}") from error
+    if not math.isfinite(value):
+        raise FittingError(f"{where} gives {value!r} where the fit starts")
 
 
 def values_of(parameters: Sequence[FreeParameter], found: lmfit.Parameters) -> dict[str, float]:

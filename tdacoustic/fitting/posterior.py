@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FittingError, MissingPackageError
-from tdacoustic.fitting.loss import Residuals, cost_of, with_priors
+from tdacoustic.fitting.loss import Objective, Residuals
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.settings import PosteriorSettings
 
@@ -107,10 +107,12 @@ def sample_posterior(residuals: Residuals, found: Fit, settings: PosteriorSettin
             'a posterior needs the package emcee, which is not installed: pip install "tdacoustic[posterior]"'
         ) from None
     moved = found.moved
+    if not moved:
+        raise FittingError("a posterior needs a parameter that the fit moves")
     for parameter in moved:
         if parameter.prior is None and not math.isfinite(parameter.width):
             raise FittingError(f"{parameter.name} needs bounds or a prior for a posterior")
-    weighted = with_priors(residuals, found.parameters)
+    objective = Objective(residuals, found.parameters, found.loss)
     lows = np.array([p.inner(p.low) for p in moved])
     highs = np.array([p.inner(p.high) for p in moved])
 
@@ -118,7 +120,7 @@ def sample_posterior(residuals: Residuals, found: Fit, settings: PosteriorSettin
         if (place < lows).any() or (place > highs).any():
             return -math.inf
         values = found.at({p.name: float(inner) for p, inner in zip(moved, place, strict=True)})
-        return -0.5 * cost_of(weighted(values), found.loss)
+        return -0.5 * objective.cost(values)
 
     random = np.random.default_rng(settings.seed)
     start = _start(found, lows, highs, max(settings.walkers, 2 * len(moved) + 2), random)
@@ -140,9 +142,9 @@ def sample_posterior(residuals: Residuals, found: Fit, settings: PosteriorSettin
 def _start(found: Fit, lows: Real, highs: Real, n_walkers: int, random: np.random.Generator) -> Real:
     """Walkers in a ball around the optimum, of its standard errors where these are known."""
     best = np.array([p.inner(found.values[p.name]) for p in found.moved])
-    errors = found.inner_errors()
+    errors = found.inner_errors() or {}
     width = np.where(np.isfinite(highs - lows), highs - lows, 1.0)
-    size = 0.05 * width if errors is None else np.minimum([errors[p.name] for p in found.moved], 0.1 * width)
+    size = np.array([min(errors.get(p.name, math.inf), 0.05 * w) for p, w in zip(found.moved, width, strict=True)])
     start = best + size * random.standard_normal((n_walkers, best.size))
     inner = 1e-6 * width
     return np.asarray(np.clip(start, lows + inner, highs - inner) + inner * random.uniform(-0.5, 0.5, start.shape))

@@ -25,7 +25,10 @@ Levels: TypeAlias = Callable[[Mapping[str, float]], Real]
 TOLERANCE_DB: Final = 0.05
 """Largest difference at midpoints of nodes that is taken; half the spacing brings it below a hundredth."""
 
-_INTERVALS: Final = ((8, 16, 32, 64), (8, 16))
+HOPELESS_DB: Final = 20.0 * TOLERANCE_DB
+"""Difference from which finer nodes are not tried: the levels jump or bend."""
+
+_INTERVALS: Final = ((8, 16, 32), (8, 16))
 """Intervals tried, of one parameter and of two."""
 
 _CHECKED_CELLS: Final = 24
@@ -78,6 +81,8 @@ def response_of(levels: Levels, parameters: Sequence[FreeParameter]) -> Response
     for intervals in _INTERVALS[len(held) - 1]:
         axes = [np.linspace(p.inner(p.low), p.inner(p.high), intervals + 1) for p in held]
         known = np.array([levels(_values(held, place)) for place in itertools.product(*axes)])
+        if not np.isfinite(known).all():
+            return None
         splines = _splines(axes, known.reshape(*(axis.size for axis in axes), -1))
         if len(held) == 1:
             if before is not None:
@@ -85,6 +90,8 @@ def response_of(levels: Levels, parameters: Sequence[FreeParameter]) -> Response
                 error_db = float(np.abs(checked - known[1::2]).max(initial=0.0))
                 if error_db <= TOLERANCE_DB:
                     return Response(held, splines, error_db)
+                if error_db > HOPELESS_DB:
+                    return None
             before = Response(held, splines, np.inf)
         else:
             found = Response(held, splines, np.inf)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from tdacoustic.fitting.loss import Loss, Residuals, cost_of
+from tdacoustic.fitting.loss import Objective
 from tdacoustic.fitting.parameters import FreeParameter, lmfit_parameters, values_of
 
 __all__ = ["REFINED", "best_starts", "spread_starts"]
@@ -34,7 +34,7 @@ def spread_starts(parameters: tuple[FreeParameter, ...], n_starts: int, seed: in
 
 
 def best_starts(
-    weighted: Residuals, parameters: tuple[FreeParameter, ...], starts: list[dict[str, float]], loss: Loss
+    objective: Objective, parameters: tuple[FreeParameter, ...], starts: list[dict[str, float]]
 ) -> list[dict[str, float]]:
     """Return the initial values and the best of the other starts, those first that are better than all around them."""
     if len(starts) <= REFINED:
@@ -42,7 +42,7 @@ def best_starts(
     first, *others = starts
 
     def misfit(start: dict[str, float]) -> float:
-        return cost_of(weighted(values_of(parameters, lmfit_parameters(parameters, start))), loss)
+        return objective.cost(values_of(parameters, lmfit_parameters(parameters, start)))
 
     ranked = sorted(others, key=misfit)
     kept = [first, *(start for start in ranked if _is_lowest_around(parameters, start, ranked))][:REFINED]

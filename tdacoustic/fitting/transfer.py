@@ -27,7 +27,7 @@ class Transferred:
     prior_sigma : float
         Its standard deviation times the discount, in the parameter's own unit.
     alone, alone_stderr : float or None
-        What the new data say without the prior; None where they do not determine it.
+        What the new data say without any of the priors carried over; None where they do not determine it.
     """
 
     key: str
@@ -40,10 +40,10 @@ class Transferred:
 
     @property
     def difference(self) -> float | None:
-        """New less earlier value over the standard deviation of both; None where the new data do not determine it."""
+        """New less earlier value over the deviation of the new one and of the prior; None where there is no new one."""
         if self.alone is None or self.alone_stderr is None:
             return None
-        spread = math.hypot(self.alone_stderr, self.earlier_stderr)
+        spread = math.hypot(self.alone_stderr, self.prior_sigma)
         return (self.alone - self.earlier) / spread if spread > 0.0 else None
 
 

@@ -12,7 +12,7 @@ from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import CampaignError
 from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
-from tdacoustic.workflows.runs import written_inputs
+from tdacoustic.workflows.runs import fleet_input, written_inputs
 
 if TYPE_CHECKING:
     from tdacoustic.fitting.calibration import Calibration
@@ -49,6 +49,8 @@ def calibrate(
     TdacousticError
         There is no fleet, nothing to calibrate with, or the fleet cannot be computed.
     """
+    from threadpoolctl import threadpool_limits
+
     from tdacoustic.fitting.calibration import calibrate_fleet
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
@@ -63,23 +65,27 @@ def calibrate(
     if analysis is None and campaign.runs:
         analysis = _analyzed(campaign, store, jobs, progress)
     joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
-    free, transferred, inputs = free_parameters(campaign, fleet, joint.campaigns)
+    free, transferred, earlier = free_parameters(campaign, fleet, joint.campaigns)
     if progress is not None:
         progress("calibrating", 0, 1)
-    found = calibrate_fleet(
-        fleet,
-        joint.data,
-        free,
-        fit_settings(campaign),
-        f"calibrated to {' and '.join([campaign.name, *joint.campaigns[1:]])}",
-        candidates=candidates_of(campaign, fleet, joint.data),
-        transferred=transferred,
-    )
+    with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
+        found = calibrate_fleet(
+            fleet,
+            joint.data,
+            free,
+            fit_settings(campaign),
+            f"calibrated to {' and '.join(joint.campaigns)}",
+            candidates=candidates_of(campaign, fleet, joint.data),
+            transferred=transferred,
+            earlier=earlier,
+        )
+        over_speed = _over_speed(fleet, found, joint.data)
     doubts = (*joint.doubts, *_doubts_of_lines(analysis, joint.data), *found.doubts)
     found = replace(found, doubts=tuple(dict.fromkeys(doubts)))
     own = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
-    over_speed = _over_speed(fleet, found, joint.data)
-    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *inputs), over_speed)
+    prior_fleet = campaign.calibration.prior_fleet
+    prior = () if prior_fleet is None else (fleet_input(prior_fleet, "prior fleet"),)
+    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *prior), over_speed)
 
 
 def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -> list[str]:
@@ -87,7 +93,7 @@ def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -
     if analysis is None or all(datum.what != "overall" for datum in data):
         return []
     parts = [verdict.line_fraction for verdict in analysis.dominance if verdict.line_fraction is not None]
-    if not parts or max(parts) >= MOST_OF_THE_SOUND:
+    if not parts or min(parts) >= MOST_OF_THE_SOUND:
         return []
     between = " to ".join(dict.fromkeys(f"{100.0 * part:.0f}" for part in (min(parts), max(parts))))
     return [

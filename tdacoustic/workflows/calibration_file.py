@@ -55,7 +55,7 @@ def calibration_json(result: CampaignCalibration) -> str:
         "inputs": [{"file": file.written, "sha256": file.sha256} for file in result.inputs],
         "versions": result.versions,
     }
-    return json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
+    return json.dumps(_finite(document), indent=2, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def _parameter(parameter: FittedParameter) -> dict[str, Any]:
@@ -63,8 +63,8 @@ def _parameter(parameter: FittedParameter) -> dict[str, Any]:
     return {
         "value": held.value,
         "initial": held.initial,
-        "min": _known(held.low),
-        "max": _known(held.high),
+        "min": held.low,
+        "max": held.high,
         "stderr": held.stderr,
         "ci95": None if held.ci95 is None else list(held.ci95),
         "ci68": None if held.ci68 is None else list(held.ci68),
@@ -145,5 +145,10 @@ def _posterior(found: Calibration) -> dict[str, Any] | None:
     }
 
 
-def _known(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+def _finite(value: Any) -> Any:
+    """What JSON can hold: no number is null."""
+    if isinstance(value, dict):
+        return {key: _finite(held) for key, held in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(held) for held in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

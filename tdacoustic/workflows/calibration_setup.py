@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
-from tdacoustic.errors import FleetError
+from tdacoustic.errors import CampaignError, FittingError, FleetError
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from tdacoustic.fitting.settings import FitSettings
     from tdacoustic.fitting.transfer import Transferred
     from tdacoustic.fleet import Fleet
-    from tdacoustic.results import LogInput
 
 __all__ = ["candidates_of", "fit_settings", "free_parameters"]
 
@@ -41,8 +40,8 @@ def fit_settings(campaign: Campaign) -> FitSettings:
 
 def free_parameters(
     campaign: Campaign, fleet: Fleet, campaigns: Sequence[str]
-) -> tuple[list[FreeParameter], tuple[Transferred, ...], tuple[LogInput, ...]]:
-    """Return the parameters of a fit, what was carried over from an earlier fleet, and the file of that one.
+) -> tuple[list[FreeParameter], tuple[Transferred, ...], Fleet | None]:
+    """Return the parameters of a fit, what was carried over from an earlier fleet, and that fleet.
 
     Parameters
     ----------
@@ -59,9 +58,11 @@ def free_parameters(
     from tdacoustic.fitting import FreeParameter
     from tdacoustic.fitting.calibration import free_parameter
     from tdacoustic.fitting.levels import offset_name
+    from tdacoustic.fitting.parameters import lmfit_parameters
     from tdacoustic.fitting.transfer import transferred_priors
     from tdacoustic.fleet import load_fleet
-    from tdacoustic.workflows.runs import fleet_input
+    from tdacoustic.fleet.entries import split_entry
+    from tdacoustic.fleet.messages import key_problem
 
     stated = campaign.calibration
     free = []
@@ -70,31 +71,40 @@ def free_parameters(
         prior = None
         if held.prior_mean is not None and held.prior_sigma is not None:
             prior = held.prior_mean, held.prior_sigma
-        made = free_parameter(
-            fleet,
-            name,
-            initial=_start(fleet, name, held.value, held.expression),
-            low=held.min,
-            high=held.max,
-            prior=prior,
-            scale=held.scale,
-            expression=held.expression,
-        )
+        try:
+            made = free_parameter(
+                fleet,
+                name,
+                initial=_start(name, held.value, held.expression),
+                low=held.min,
+                high=held.max,
+                prior=prior,
+                scale=held.scale,
+                expression=held.expression,
+            )
+        except (FittingError, FleetError) as error:
+            if isinstance(error, FleetError) and key_problem(split_entry(name)[0]) is None:
+                raise  # a parameter that fleets have, and this one lacks
+            raise CampaignError(f"{campaign.path}: [calibration]: {error}") from error
         free.append(made)
+    try:
+        lmfit_parameters(free)
+    except FittingError as error:
+        raise CampaignError(f"{campaign.path}: [[calibration.parameter]]: {error}") from error
     transferred: tuple[Transferred, ...] = ()
-    inputs: tuple[LogInput, ...] = ()
+    earlier = None
     if stated.prior_fleet is not None:
         earlier = load_fleet(stated.prior_fleet.path)
         carried, transferred = transferred_priors(free, earlier, stated.prior_discount)
-        free, inputs = list(carried), (fleet_input(stated.prior_fleet, "prior fleet"),)
+        free = list(carried)
     if len(campaigns) > 1:
         sigma = stated.offset_sigma_db
         bound = OFFSET_BOUNDS * sigma
         free += [FreeParameter(offset_name(name), 0.0, -bound, bound, (0.0, sigma)) for name in campaigns]
-    return free, transferred, inputs
+    return free, transferred, earlier
 
 
-def _start(fleet: Fleet, name: str, stated: float | None, expression: str | None) -> float | None:
+def _start(name: str, stated: float | None, expression: str | None) -> float | None:
     """Where the search starts; an auxiliary parameter with an expression need not say."""
     return 1.0 if stated is None and expression is not None and "." not in name else stated
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import statistics
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Final
 
 from tdacoustic.errors import FittingError
@@ -78,9 +78,12 @@ def measured_levels(
         for levels, problems in _recorded(usable, conditions, fleet, data):
             found += levels
             doubts += problems
+        doubts += _not_there(campaign, found, data)
         if "surface" in data and not {"receivers", "bands"}.isdisjoint(data):
             others = " and ".join(name for name in ("receivers", "bands") if name in data)
             doubts.append(f"the 4 m level and its {others} are of the same recordings, which count more than once")
+    elif set(data) != {"surface"}:
+        doubts.append(f"data: there are no recordings to take {' and '.join(data)} from; stated levels alone are used")
     levels, problems = _stated(campaign, conditions)
     found += levels
     doubts += problems
@@ -91,6 +94,16 @@ def measured_levels(
             f"usable run, and no [[level]] (data: {', '.join(data)}{'; ' + said if said else ''})"
         )
     return found, list(dict.fromkeys(doubts))
+
+
+def _not_there(campaign: Campaign, found: Sequence[MeasuredLevel], data: Collection[str]) -> list[str]:
+    """Say which kind of level was asked for and is not there."""
+    held = {
+        "receivers": any(datum.receiver.name in {channel.name for channel in campaign.channels} for datum in found),
+        "bands": any(datum.what.startswith("1/3 octave") for datum in found),
+        "orders": any(datum.what == "mesh order" for datum in found),
+    }
+    return [f"data: no levels of {kind} are there" for kind in data if not held.get(kind, True)]
 
 
 def _recorded(

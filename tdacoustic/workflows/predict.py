@@ -51,6 +51,8 @@ def predict(
     TdacousticError
         The fleet is wrong, lacks a parameter, or its gears cannot be; or there is no condition.
     """
+    from threadpoolctl import threadpool_limits
+
     from tdacoustic.drive import DriveModel
     from tdacoustic.results import FleetPrediction, LogInput
     from tdacoustic.tables import predicted_tables
@@ -61,7 +63,8 @@ def predict(
     held = model.conditions if conditions is None else tuple(conditions)
     if not held:
         raise FleetError(f"{fleet.path}: there is no condition to compute: no speed is known")
-    prediction = model.evaluate(held, receivers)
+    with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
+        prediction = model.evaluate(held, receivers)
     sweep, records, doubts = _sweep(model, max(condition.train_speed_km_h for condition in held), store, progress)
     prediction = replace(prediction, sweep=sweep, doubts=(*prediction.doubts, *doubts))
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)

@@ -63,5 +63,7 @@ def test_a_condition_far_off_and_one_condition_alone_are_doubted(fleet, data):
 
 
 def test_levels_need_a_standard_deviation(data):
-    with pytest.raises(FittingError, match="condition 2: the level's standard deviation must be > 0 dB, got 0"):
+    with pytest.raises(
+        FittingError, match=r"condition 2: the level's standard deviation must be > 0 dB .at least 0.001., got 0"
+    ):
         replace(data[0], sigma_db=0.0)

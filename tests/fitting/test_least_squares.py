@@ -119,7 +119,7 @@ def test_a_robust_loss_leaves_an_outlier():
         (lambda: FreeParameter("a", 3.0, 0.0, 1.0), "a: the initial value 3 is outside of its bounds, 0 to 1"),
         (lambda: FreeParameter("a", 0.5, 1.0, 0.0), "a: bounds must be ascending"),
         (lambda: FreeParameter("a", 0.5, prior=(0.0, 0.0)), "a: the prior's standard deviation must be > 0, got 0"),
-        (lambda: FreeParameter("a", -1.0, scale="log"), 'a: scale = "log" needs values above 0'),
+        (lambda: FreeParameter("a", -1.0, scale="log"), 'a: scale = "log" needs values and bounds above 0'),
         (lambda: FreeParameter("a", float("nan")), "a: the initial value must be a number"),
         (lambda: fit(lambda v: np.zeros(0), [FreeParameter("a", 1.0)]), "no data to fit to"),
         (lambda: fit(lambda v: np.array([np.nan]), [FreeParameter("a", 1.0)]), "no number for some of the data"),

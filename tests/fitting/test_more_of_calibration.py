@@ -63,7 +63,7 @@ def test_no_more_levels_than_parameters_leave_no_scatter_to_fit(shared_fleet, le
     free = free_of(shared_fleet, CONSTANT, DAMPING)
     found = calibrate_fleet(shared_fleet, levels_of(TRUTH, [4, 5]), free, FitSettings(None))
     assert found.model_sigma_db == 4.0
-    assert any("the model's scatter cannot be fitted: 2 levels and 2 parameters" in doubt for doubt in found.doubts)
+    assert any("the model's scatter cannot be fitted: 2 conditions and 2 parameters" in doubt for doubt in found.doubts)
 
 
 def test_campaigns_with_offsets_are_fitted_together(shared_fleet, levels_of):

@@ -138,7 +138,7 @@ def test_a_calibrated_fleet_is_the_prior_of_the_next(tda, tmp_path):
     expected = (weights[0] * earlier["value"] + weights[1] * carried["alone"]) / sum(weights)
     assert parameter["value"] == pytest.approx(expected, abs=1e-3)
     assert carried["difference"] == pytest.approx(
-        (carried["alone"] - earlier["value"]) / (sigma**2 + earlier["stderr"] ** 2) ** 0.5, rel=1e-3
+        (carried["alone"] - earlier["value"]) / (sigma**2 + (3 * earlier["stderr"]) ** 2) ** 0.5, rel=1e-3
     )
     assert "../earlier/fleet.calibrated.toml" in [item["file"] for item in found["inputs"]]
 

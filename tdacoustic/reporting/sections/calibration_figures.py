@@ -62,7 +62,7 @@ def levels_figure(result: CampaignCalibration) -> Figure | None:
     for slot, origin in enumerate(dict.fromkeys(level.datum.origin for level in held)):
         of_origin = [level for level in held if level.datum.origin == origin]
         elements.append(_levels(of_origin, f"level, {origin} (± 1 σ)", SYMBOLS.get(origin, "circle"), slot))
-    if is_of_the_paper(result.fleet):
+    if is_of_the_paper(result.fleet) and result.campaign.origin != "measured":
         elements += _of_paper(result)
     if not elements:
         return None
