@@ -27,6 +27,7 @@ ALLOWED = {
     "gears": "errors",
     "motor": "errors",
     "radiation": "units errors",
+    "housing": "gears errors",
     "drive": "radiation motor gears spectra fleet steps units errors",
     "fitting": "drive radiation motor gears fleet steps units errors",
     "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
