@@ -28,7 +28,7 @@ ALLOWED = {
     "motor": "errors",
     "radiation": "units errors",
     "housing": "gears errors",
-    "drive": "radiation motor gears spectra fleet steps units errors",
+    "drive": "housing radiation motor gears spectra fleet steps units errors",
     "fitting": "drive radiation motor gears fleet steps units errors",
     "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
     "attribution": "measured quality lines spectra speed campaign fleet steps units errors",

@@ -2,10 +2,19 @@
 
 from tdacoustic.drive.conditions import Condition, conditions_of, torque_at
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
+from tdacoustic.drive.housing_field import HousingField, HousingSound
 from tdacoustic.drive.levels import LevelAt, Receiver
 from tdacoustic.drive.model import DriveModel
-from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase, Prediction, SpeedSweep
-from tdacoustic.drive.sources import SoundSource
+from tdacoustic.drive.prediction import (
+    Directivity,
+    DriveSound,
+    GearState,
+    HelixCase,
+    HousingFacts,
+    Prediction,
+    SpeedSweep,
+)
+from tdacoustic.drive.sources import SoundSource, StructureSource
 
 __all__ = [
     "Condition",
@@ -15,11 +24,15 @@ __all__ = [
     "GearState",
     "GearUnit",
     "HelixCase",
+    "HousingFacts",
+    "HousingField",
+    "HousingSound",
     "LevelAt",
     "Prediction",
     "Receiver",
     "SoundSource",
     "SpeedSweep",
+    "StructureSource",
     "conditions_of",
     "gear_unit_of",
     "torque_at",

@@ -52,12 +52,15 @@ def _mode_doubts(fleet: Fleet, states: tuple[GearState, ...]) -> Iterator[str]:
 def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str, ...]) -> Iterator[str]:
     """Yield what the reader must know of the levels; `unknown` names the motor's excitations without amplitude."""
     gear_path, placement = fleet.model.gear_path.value, fleet.masuda.placement.value
-    if fleet.radiation.method.value != "point_sources":
-        yield "boundary elements are not there yet: the field is that of point sources"
-    if gear_path != "masuda":
+    if gear_path != "masuda" and fleet.radiation.method.value == "point_sources":
         yield (
-            f'gear_path = "{gear_path}": the bearing forces\' way through the housing is not there yet, so the '
-            "total lacks it"
+            f'gear_path = "{gear_path}": the bearing forces\' way through the housing takes method = '
+            '"boundary_elements", so the total lacks it'
+        )
+    if gear_path == "sum" and placement == "free":
+        yield (
+            'gear_path = "sum": the gear is counted twice, once by Masuda\'s level of the whole unit and once by the '
+            "bearing forces through its housing"
         )
     if placement == "inside" and gear_path != "structure":
         yield (

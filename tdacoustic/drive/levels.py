@@ -3,24 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.drive.sources import SoundSource
+from tdacoustic.drive.sources import SoundSource, StructureSource
 from tdacoustic.fleet import Fleet
+from tdacoustic.gears import BearingForces
 from tdacoustic.radiation import Air, mean_over_sphere_db, overall_level_db, transfer_db
 from tdacoustic.spectra.weighting import a_weighting_db
 
-__all__ = ["LevelAt", "PointField", "Receiver"]
+__all__ = ["CIRCLE_DEG", "LevelAt", "PointField", "Receiver", "circle_of"]
 
+Real = NDArray[np.float64]
+Point = tuple[float, float, float]
 Path = Literal["structure", "mesh", "motor", "total"]
 PATHS: tuple[Path, ...] = ("structure", "mesh", "motor", "total")
 Weighting = Literal["Z", "A"]
 WEIGHTINGS: tuple[Weighting, ...] = ("Z", "A")
+
+CIRCLE_DEG: Final = tuple(5.0 * number for number in range(72))
+"""Angles of the directivity in degrees, from x towards y."""
 
 
 @dataclass(frozen=True)
@@ -74,9 +80,15 @@ class PointField:
     ----------
     surface : Receiver
         That of ``[radiation] sphere_radius_m``.
+    circle : tuple of Receiver
+        Around the circle of ``[radiation] circle_radius_m`` in the plane z = 0, every 5°.
     adds : tuple of str
         Paths that the total adds.
+    mesh_position_m : (float, float, float) or None
+        Where the mesh's free source stands; None of the fleet's own.
     """
+
+    mesh_position_m: Point | None = None
 
     def __init__(self, fleet: Fleet) -> None:
         radiation = fleet.radiation
@@ -84,11 +96,24 @@ class PointField:
         self._sound_speed_m_s = Air(fleet.number("radiation.temperature_degc")).sound_speed_m_s
         self._ground_m = -0.5 * fleet.train.wheel_diameter_m if self._space == "half" else None
         self.surface = Receiver(f"{radiation.sphere_radius_m.value:g} m", radiation.sphere_radius_m.value)
-        self._circle_m = radiation.circle_radius_m.value
+        self.circle = circle_of(fleet)
         self.adds = paths_of_total(fleet)
 
-    def transfer_db(self, source: SoundSource, receiver: Receiver) -> float:
-        """Level at a receiver less the sound power level of a source."""
+    def structure_sources(
+        self, forces: BearingForces | None, loss_factor: float | None = None
+    ) -> tuple[StructureSource, ...]:
+        """Return the tones of the housing under bearing forces: none of a field without housing."""
+        return ()
+
+    def doubts(self, sources: Sequence[SoundSource]) -> Iterator[str]:
+        """Yield what the reader must know of the field of sources."""
+        yield from ()
+
+    def transfer_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
+        """Return the level at receivers less the sound power level of a source, shape (receivers,)."""
+        return np.array([self._free_db(source, receiver) for receiver in receivers])
+
+    def _free_db(self, source: SoundSource, receiver: Receiver) -> float:
         if receiver.position_m is None:
             return mean_over_sphere_db(receiver.distance_m, self._space)
         found = transfer_db(
@@ -96,24 +121,23 @@ class PointField:
         )
         return float(found)
 
-    def levels(self, sources: Sequence[SoundSource], receivers: Iterable[Receiver]) -> tuple[LevelAt, ...]:
+    def levels(self, sources: Sequence[SoundSource], receivers: Sequence[Receiver]) -> tuple[LevelAt, ...]:
         """Return the level of each path and of the total at each receiver, unweighted and A-weighted.
 
         Parameters
         ----------
         sources : sequence of SoundSource
-        receivers : iterable of Receiver
+        receivers : sequence of Receiver
         """
         found = []
-        for receiver in receivers:
+        received = {weighting: self._received_db(sources, receivers, weighting) for weighting in WEIGHTINGS}
+        for number, receiver in enumerate(receivers):
             for weighting in WEIGHTINGS:
-                held = self.received_db(sources, receiver, weighting)
+                held = received[weighting][:, number]
                 found += [LevelAt(receiver.name, path, weighting, self._of_path(path, sources, held)) for path in PATHS]
         return tuple(found)
 
-    def received_db(
-        self, sources: Sequence[SoundSource], receiver: Receiver, weighting: Weighting = "Z"
-    ) -> list[float]:
+    def received_db(self, sources: Sequence[SoundSource], receiver: Receiver, weighting: Weighting = "Z") -> Real:
         """Return the level of each source at a receiver.
 
         Parameters
@@ -122,25 +146,36 @@ class PointField:
         receiver : Receiver
         weighting : {"Z", "A"}
         """
-        at = [source.sound_power_level_db + self.transfer_db(source, receiver) for source in sources]
-        if weighting == "Z":
-            return at
-        return [level + float(a_weighting_db(s.frequency_hz)) for level, s in zip(at, sources, strict=True)]
+        return self._received_db(sources, (receiver,), weighting)[:, 0]
 
-    def _of_path(self, path: Path, sources: Sequence[SoundSource], levels_db: Sequence[float]) -> float | None:
+    def _received_db(self, sources: Sequence[SoundSource], receivers: Sequence[Receiver], weighting: Weighting) -> Real:
+        """Return the level of each source at each receiver, shape (sources, receivers)."""
+        at = np.empty((len(sources), len(receivers)))
+        for row, source in zip(at, sources, strict=True):
+            row[:] = source.sound_power_level_db + self.transfer_db(source, receivers)
+        if weighting == "A":
+            at = at + np.array([float(a_weighting_db(source.frequency_hz)) for source in sources])[:, None]
+        return at
+
+    def _of_path(self, path: Path, sources: Sequence[SoundSource], levels_db: Real) -> float | None:
         wanted = self.adds if path == "total" else (path,)
         return overall_level_db([level for s, level in zip(sources, levels_db, strict=True) if s.path in wanted])
 
-    def around_db(self, sources: Sequence[SoundSource], angles_deg: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the total level around the circle in the plane z = 0, at angles from x towards y; NaN of no sound."""
-        around = []
-        for angle in np.radians(angles_deg):
-            place = (self._circle_m * math.cos(angle), self._circle_m * math.sin(angle), 0.0)
-            receiver = Receiver("circle", self._circle_m, place)
-            held = [s for s in sources if s.path in self.adds]
-            level = overall_level_db([s.sound_power_level_db + self.transfer_db(s, receiver) for s in held])
-            around.append(math.nan if level is None else level)
-        return np.array(around)
+    def around_db(self, sources: Sequence[SoundSource]) -> Real:
+        """Return the total level around the circle, shape (72,); NaN of no sound."""
+        held = [source for source in sources if source.path in self.adds]
+        if not held:
+            return np.full(len(self.circle), math.nan)
+        return 10.0 * np.log10(np.sum(10.0 ** (0.1 * self._received_db(held, self.circle, "Z")), axis=0))
+
+
+def circle_of(fleet: Fleet) -> tuple[Receiver, ...]:
+    """Return the receivers around the circle of ``[radiation] circle_radius_m``, from x towards y."""
+    radius_m = fleet.radiation.circle_radius_m.value
+    return tuple(
+        Receiver(f"{angle:g}°", radius_m, (radius_m * math.cos(turn), radius_m * math.sin(turn), 0.0))
+        for angle, turn in zip(CIRCLE_DEG, np.radians(CIRCLE_DEG).tolist(), strict=True)
+    )
 
 
 def paths_of_total(fleet: Fleet) -> tuple[Path, ...]:

@@ -13,12 +13,13 @@ import numpy as np
 from tdacoustic.drive.conditions import Condition, conditions_of
 from tdacoustic.drive.doubts import gear_doubts, sound_doubts
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
-from tdacoustic.drive.levels import PointField, Receiver
+from tdacoustic.drive.housing_field import HousingField, HousingSound
+from tdacoustic.drive.levels import CIRCLE_DEG, PointField, Receiver
 from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase, Prediction
 from tdacoustic.drive.sources import MotorSources, SoundSource, mesh_source
 from tdacoustic.errors import FleetError, GearError
 from tdacoustic.fleet import Fleet
-from tdacoustic.gears import SteadyState, bearing_forces, masuda_level_db, steady_state
+from tdacoustic.gears import BearingForces, SteadyState, bearing_forces, masuda_level_db, steady_state
 
 __all__ = ["DriveModel"]
 
@@ -31,13 +32,13 @@ class DriveModel:
     fleet : Fleet
     unit : GearUnit, optional
         Its gears, where they are known already.
+    housing : HousingSound, optional
+        The housing's transfer vectors, which sound by ``method = "boundary_elements"`` needs.
 
     Attributes
     ----------
     fleet : Fleet
     unit : GearUnit
-    field : PointField
-        Of its sources.
 
     Raises
     ------
@@ -45,11 +46,29 @@ class DriveModel:
         The fleet lacks what the model needs, or its gears cannot be.
     """
 
-    def __init__(self, fleet: Fleet, unit: GearUnit | None = None) -> None:
+    def __init__(self, fleet: Fleet, unit: GearUnit | None = None, housing: HousingSound | None = None) -> None:
         self.fleet = fleet
         self.unit = unit or gear_unit_of(fleet)
         self._motor = MotorSources(fleet)
-        self.field = PointField(fleet)
+        self._housing = housing
+
+    @cached_property
+    def field(self) -> PointField:
+        """The field of its sources; a `HousingField` with boundary elements.
+
+        Raises
+        ------
+        FleetError
+            Boundary elements without transfer vectors.
+        """
+        if self.fleet.radiation.method.value == "point_sources":
+            return PointField(self.fleet)
+        if self._housing is None:
+            raise FleetError(
+                f'{self.fleet.path}: [radiation] method = "boundary_elements" needs the transfer vectors of the '
+                "housing: tdacoustic.predict and tdacoustic.calibrate compute them"
+            )
+        return HousingField(self.fleet, self._housing)
 
     @cached_property
     def conditions(self) -> tuple[Condition, ...]:
@@ -70,7 +89,7 @@ class DriveModel:
         """
         held = self.conditions if conditions is None else tuple(conditions)
         states = tuple(self.gears(condition) for condition in held)
-        sound = tuple(self._sound_of(state, receivers) for state in states)
+        sound = tuple(self.sound_of(state, receivers) for state in states)
         helix = self._helix_cases(max(held, key=lambda condition: condition.motor_hz), receivers) if held else ()
         around = [
             *(
@@ -82,12 +101,27 @@ class DriveModel:
         doubts = (
             *gear_doubts(self.fleet, self.unit, states, helix),
             *sound_doubts(self.fleet, sound, self._motor.without_amplitude),
+            *self.field.doubts([source for one in sound for source in one.sources]),
         )
         return Prediction(
-            self.unit, states, sound, self.field.surface.name, tuple(around), helix, None, tuple(dict.fromkeys(doubts))
+            self.unit,
+            states,
+            sound,
+            self.field.surface.name,
+            tuple(around),
+            helix,
+            None,
+            tuple(dict.fromkeys(doubts)),
+            self.field.facts if isinstance(self.field, HousingField) else None,
         )
 
-    def sound(self, condition: Condition, masuda_db: float | None, receivers: Sequence[Receiver] = ()) -> DriveSound:
+    def sound(
+        self,
+        condition: Condition,
+        masuda_db: float | None,
+        receivers: Sequence[Receiver] = (),
+        forces: BearingForces | None = None,
+    ) -> DriveSound:
         """Return the drive's sound in a condition.
 
         Parameters
@@ -97,8 +131,11 @@ class DriveModel:
             Level of the meshing noise at 1 m: see `masuda_db`.
         receivers : sequence of Receiver
             Besides the surface.
+        forces : BearingForces, optional
+            Without them there is no structure-borne sound.
         """
-        sources = (*self.motor_sources(condition), *self.gear_sources(condition, masuda_db))
+        structure = self.field.structure_sources(forces)
+        sources = (*self.motor_sources(condition), *self.gear_sources(condition, masuda_db), *structure)
         levels = self.field.levels(sources, (self.field.surface, *receivers))
         return DriveSound(condition.name, sources, levels)
 
@@ -108,15 +145,16 @@ class DriveModel:
 
     def gear_sources(self, condition: Condition, masuda_db: float | None) -> tuple[SoundSource, ...]:
         """Return the meshing noise in a condition; of no level, none."""
-        mesh = mesh_source(self.fleet, self.unit.mesh_hz(condition.motor_hz), masuda_db)
+        mesh_hz = self.unit.mesh_hz(condition.motor_hz)
+        mesh = mesh_source(self.fleet, mesh_hz, masuda_db, self.field.mesh_position_m)
         return () if mesh is None else (mesh,)
 
-    def _sound_of(self, state: GearState, receivers: Sequence[Receiver]) -> DriveSound:
-        return self.sound(state.condition, state.masuda_db, receivers)
+    def sound_of(self, state: GearState, receivers: Sequence[Receiver] = ()) -> DriveSound:
+        """Return the drive's sound with the gears in a state, at the surface and at receivers."""
+        return self.sound(state.condition, state.masuda_db, receivers, state.forces)
 
     def _around(self, sweep: Literal["speed", "helix"], value: float, sound: DriveSound) -> Directivity:
-        angles = np.arange(0.0, 360.0, 5.0)
-        return Directivity(sweep, value, angles, self.field.around_db(sound.sources, angles))
+        return Directivity(sweep, value, np.array(CIRCLE_DEG), self.field.around_db(sound.sources))
 
     def gears(self, condition: Condition, unit: GearUnit | None = None) -> GearState:
         """Return the gears in one condition.
@@ -182,5 +220,5 @@ class DriveModel:
         for angle_deg in stated.value if stated is not None else (own_deg,):
             unit = gear_unit_of(self.fleet, math.radians(angle_deg))
             gears = self.gears(replace(condition, name=f"{condition.name}, {angle_deg:g}°"), unit)
-            cases.append(HelixCase(angle_deg, unit, gears, self._sound_of(gears, receivers)))
+            cases.append(HelixCase(angle_deg, unit, gears, self.sound_of(gears, receivers)))
         return tuple(cases)

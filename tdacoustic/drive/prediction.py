@@ -15,7 +15,7 @@ from tdacoustic.drive.sources import SoundSource
 from tdacoustic.gears import BearingForces, Branch, SteadyState
 from tdacoustic.radiation import overall_level_db
 
-__all__ = ["Directivity", "DriveSound", "GearState", "HelixCase", "Prediction", "SpeedSweep"]
+__all__ = ["Directivity", "DriveSound", "GearState", "HelixCase", "HousingFacts", "Prediction", "SpeedSweep"]
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,38 @@ class Directivity:
 
 
 @dataclass(frozen=True)
+class HousingFacts:
+    """What the sound of a housing was computed with.
+
+    Parameters
+    ----------
+    mass_kg : float
+        Of the housing's finite elements.
+    mode_hz : ndarray, shape (modes,)
+        Natural frequencies; the static correction comes on top.
+    corrections : int
+        Number of shapes of the static correction.
+    range_hz : (float, float)
+        Where the transfer vectors hold; bearing forces beyond make no sound here.
+    left_share : (float, float)
+        Part of the pinion's and of the wheel's bearing force that the bearing at +y takes.
+    position_m, mesh_m : (float, float, float)
+        Of the housing's middle and of the mesh's free source, in the drive frame.
+    motor_m : (float, float, float) or None
+        Of the motor's sources; None of a motor without sound.
+    """
+
+    mass_kg: float
+    mode_hz: NDArray[np.float64]
+    corrections: int
+    range_hz: tuple[float, float]
+    left_share: tuple[float, float]
+    position_m: tuple[float, float, float]
+    mesh_m: tuple[float, float, float]
+    motor_m: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
 class HelixCase:
     """One helix angle of the helix sweep; rack, teeth, shifts and face width stay.
 
@@ -144,6 +176,8 @@ class Prediction:
     sweep : SpeedSweep or None
     doubts : tuple of str
         What the reader must know before using the numbers.
+    housing : HousingFacts or None
+        None of a field of point sources.
     """
 
     unit: GearUnit
@@ -154,6 +188,7 @@ class Prediction:
     helix: tuple[HelixCase, ...]
     sweep: SpeedSweep | None
     doubts: tuple[str, ...]
+    housing: HousingFacts | None = None
 
     def sound_of(self, condition: str) -> DriveSound | None:
         """Return the drive's sound in a condition, or None where it was not computed."""

@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tdacoustic.drive.conditions import Condition
 from tdacoustic.errors import FleetError, MotorError
@@ -15,10 +18,12 @@ from tdacoustic.motor import MotorFrame, Ring
 from tdacoustic.radiation import Air
 from tdacoustic.spectra.weighting import a_weighting_db
 
-__all__ = ["MotorSources", "SoundSource", "mesh_source"]
+__all__ = ["MotorSources", "SoundSource", "SourcePlaces", "StructureSource", "mesh_source"]
 
 _REFERENCE_W = 1e-12
-_CENTRE = (0.0, 0.0, 0.0)
+Point = tuple[float, float, float]
+
+_CENTRE: Point = (0.0, 0.0, 0.0)
 
 _FRAME_KEYS = (
     *(f"{part}_{what}_mm" for part in ("core", "frame") for what in ("radius", "length", "thickness")),
@@ -32,7 +37,7 @@ class SoundSource:
 
     Parameters
     ----------
-    path : {"motor", "mesh"}
+    path : {"motor", "mesh", "structure"}
     name : str
         Of the excitation.
     frequency_hz : float
@@ -42,11 +47,39 @@ class SoundSource:
         In the drive's frame.
     """
 
-    path: Literal["motor", "mesh"]
+    path: Literal["motor", "mesh", "structure"]
     name: str
     frequency_hz: float
     sound_power_level_db: float
-    position_m: tuple[float, float, float] = _CENTRE
+    position_m: Point = _CENTRE
+
+
+@dataclass(frozen=True, eq=False)
+class StructureSource(SoundSource):
+    """A tone of the housing that the bearing forces shake.
+
+    Parameters
+    ----------
+    velocities : ndarray of complex, shape (modes,)
+        Peak amplitudes of the modal velocities in m √kg / s, gain included.
+    """
+
+    velocities: NDArray[np.complex128] = field(default_factory=lambda: np.zeros(0, dtype=np.complex128))
+
+
+@dataclass(frozen=True)
+class SourcePlaces:
+    """Where point sources stand.
+
+    Parameters
+    ----------
+    mesh_m : (float, float, float)
+    motor_m : (float, float, float), optional
+        None of a motor without sound.
+    """
+
+    mesh_m: Point
+    motor_m: Point | None = None
 
 
 class MotorSources:
@@ -147,7 +180,9 @@ def _frame(fleet: Fleet) -> MotorFrame:
     return MotorFrame(rings["core"], rings["frame"], values["loss_factor"])
 
 
-def mesh_source(fleet: Fleet, mesh_hz: float, masuda_db: float | None) -> SoundSource | None:
+def mesh_source(
+    fleet: Fleet, mesh_hz: float, masuda_db: float | None, position_m: Point | None = None
+) -> SoundSource | None:
     """Return the meshing noise as a tone at the mesh frequency; None where Masuda's formula has no level.
 
     The formula's level at 1 m is of a point source: its sound power level is 11 dB more. Where it is read as
@@ -160,8 +195,12 @@ def mesh_source(fleet: Fleet, mesh_hz: float, masuda_db: float | None) -> SoundS
     mesh_hz : float
     masuda_db : float or None
         At 1 m, in that reading.
+    position_m : (float, float, float), optional
+        Default: ``[masuda] position_m``, else the drive's centre.
     """
     if masuda_db is None:
         return None
+    if position_m is None:
+        position_m = _CENTRE if fleet.masuda.position_m is None else fleet.masuda.position_m.value
     weighted_db = float(a_weighting_db(mesh_hz)) if fleet.masuda.weighting.value == "A" else 0.0
-    return SoundSource("mesh", "mesh", mesh_hz, masuda_db - weighted_db + SPHERE_OF_1_M_DB)
+    return SoundSource("mesh", "mesh", mesh_hz, masuda_db - weighted_db + SPHERE_OF_1_M_DB, position_m)

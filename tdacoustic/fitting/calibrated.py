@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.drive import DriveSound
 from tdacoustic.fitting.intervals import ProfileInterval
-from tdacoustic.fitting.levels import MeasuredLevel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.fitting.next_measurement import NextMeasurement
 from tdacoustic.fitting.posterior import Posterior
 from tdacoustic.fitting.settings import FitSettings

@@ -9,6 +9,7 @@ from typing import Final
 
 import numpy as np
 
+from tdacoustic.drive import HousingSound
 from tdacoustic.errors import FittingError
 from tdacoustic.fitting.calibrated import Calibration, FittedLevel, FittedParameter, LeftOut
 from tdacoustic.fitting.doubts import (
@@ -26,15 +27,9 @@ from tdacoustic.fitting.doubts import (
 from tdacoustic.fitting.free import free_parameter
 from tdacoustic.fitting.intervals import ProfileInterval, profile_intervals
 from tdacoustic.fitting.least_squares import fit
-from tdacoustic.fitting.levels import (
-    LEVELS_OF_CALIBRATION,
-    OFFSET,
-    SILENCE_DB,
-    LevelModel,
-    MeasuredLevel,
-    fingerprint,
-)
+from tdacoustic.fitting.levels import OF_TRANSFER, OUTSIDE_TRANSFER, SILENCE_DB, LevelModel
 from tdacoustic.fitting.loss import Objective
+from tdacoustic.fitting.measured_level import LEVELS_OF_CALIBRATION, OFFSET, MeasuredLevel, fingerprint
 from tdacoustic.fitting.next_measurement import Candidate, next_measurements
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter, lmfit_parameters, values_of
@@ -68,6 +63,7 @@ def calibrate_fleet(
     candidates: Sequence[Candidate] = (),
     transferred: Sequence[Transferred] = (),
     earlier: Fleet | None = None,
+    housing: HousingSound | None = None,
 ) -> Calibration:
     """Fit parameters of a fleet to measured levels.
 
@@ -89,16 +85,20 @@ def calibrate_fleet(
         What the priors in `free` were taken from, to be compared with what the data say without them.
     earlier : Fleet, optional
         The calibrated fleet that they come from.
+    housing : HousingSound, optional
+        As of `LevelModel`.
 
     Raises
     ------
     FittingError
-        There are no data, the model gives no level for any of them, or it cannot be computed where the fit starts.
+        A parameter that the transfer vectors of the housing depend on is free; there are no data, the model gives no
+        level for any of them, or it cannot be computed where the fit starts.
     """
     settings = settings or FitSettings()
-    held, said = _heard(fleet, data)
+    _check_transfer(fleet, free)
+    held, said = _heard(fleet, data, housing)
     if model is None or len(held) != len(data):
-        model = LevelModel(fleet, held)
+        model = LevelModel(fleet, held, housing)
     _check_start(model, free)
     interpolated_db = model.prepare(free)
     sigma_db, scatter, doubts = _model_sigma_db(model, free, settings)
@@ -147,6 +147,18 @@ def calibrate_fleet(
     )
 
 
+def _check_transfer(fleet: Fleet, free: Sequence[FreeParameter]) -> None:
+    """Raise for parameters whose every value would ask for transfer vectors of its own."""
+    if fleet.radiation.method.value == "point_sources":
+        return
+    for parameter in free:
+        if parameter.name.startswith(OF_TRANSFER) and parameter.name not in OUTSIDE_TRANSFER:
+            raise FittingError(
+                f"{parameter.name} cannot be free: the transfer vectors of the housing depend on it; of the housing "
+                f"{', '.join(OUTSIDE_TRANSFER)} and model.structure_gain_db can"
+            )
+
+
 def _check_start(model: LevelModel, free: Sequence[FreeParameter]) -> None:
     """Raise for values to start from with which the model cannot be computed."""
     start = values_of(free, lmfit_parameters(free))
@@ -169,11 +181,13 @@ def _calibrated_fleet(
     return replace(made, meta=tuple(meta.items()))
 
 
-def _heard(fleet: Fleet, data: Sequence[MeasuredLevel]) -> tuple[list[MeasuredLevel], list[str]]:
+def _heard(
+    fleet: Fleet, data: Sequence[MeasuredLevel], housing: HousingSound | None
+) -> tuple[list[MeasuredLevel], list[str]]:
     """Return the data for which the model has a sound, and what was left out in words."""
     if not data:
         raise FittingError("there are no levels to calibrate with")
-    levels = LevelModel(fleet, data).levels_db({})
+    levels = LevelModel(fleet, data, housing).levels_db({})
     silent = [datum for datum, level in zip(data, levels, strict=True) if level <= SILENCE_DB]
     if len(silent) == len(data):
         names = ", ".join(dict.fromkeys(datum.condition.name for datum in silent))

@@ -10,8 +10,8 @@ from typing import Final
 import numpy as np
 
 from tdacoustic.fitting.calibrated import FittedLevel, FittedParameter, LeftOut
-from tdacoustic.fitting.levels import LEVELS_OF_CALIBRATION, MeasuredLevel, fingerprint
 from tdacoustic.fitting.loss import Objective
+from tdacoustic.fitting.measured_level import LEVELS_OF_CALIBRATION, MeasuredLevel, fingerprint
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.posterior import Posterior

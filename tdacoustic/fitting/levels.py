@@ -1,8 +1,7 @@
-"""Measured levels, and the model that a fit holds against them."""
+"""The levels of a drive's model as a function of its parameters: what a fit holds against measured ones."""
 
 from __future__ import annotations
 
-import hashlib
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,22 +10,25 @@ from typing import Final, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.drive import Condition, DriveModel, DriveSound, GearUnit, Receiver, SoundSource, torque_at
+from tdacoustic.drive import (
+    Condition,
+    DriveModel,
+    DriveSound,
+    GearUnit,
+    HousingSound,
+    Receiver,
+    SoundSource,
+    torque_at,
+)
 from tdacoustic.errors import FittingError, FleetError, TdacousticError
+from tdacoustic.fitting.measured_level import OFFSET, MeasuredLevel, offset_name
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.response import Response, response_of
 from tdacoustic.fleet import Fleet, Kinematics
+from tdacoustic.gears import BearingForces, bearing_forces
 from tdacoustic.radiation import overall_level_db
 
-__all__ = [
-    "LEVELS_OF_CALIBRATION",
-    "OFFSET",
-    "SILENCE_DB",
-    "LevelModel",
-    "MeasuredLevel",
-    "fingerprint",
-    "offset_name",
-]
+__all__ = ["OF_TRANSFER", "OUTSIDE_TRANSFER", "SILENCE_DB", "LevelModel"]
 
 Real = NDArray[np.float64]
 
@@ -36,99 +38,27 @@ DYNAMIC: Final = ("train.", "gear_pair.", "gear_dynamics.", "operation.")
 OF_MOTOR: Final = ("motor.",)
 """Parameters that change nothing at the gears but what the motor radiates."""
 
-OF_GEARS: Final = ("gear_dynamics.", "masuda.")
+OF_GEARS: Final = ("gear_dynamics.", "masuda.", "housing.")
 """Parameters that change nothing of the motor."""
 
-GAINS: Final[Mapping[str, str]] = {"masuda.constant_db": "gears", "model.motor_gain_db": "motor"}
+GAINS: Final[Mapping[str, str]] = {
+    "masuda.constant_db": "mesh",
+    "model.structure_gain_db": "structure",
+    "model.motor_gain_db": "motor",
+}
 """Parameters that add to the level of a path as they stand: nothing is computed anew for them."""
 
-LEVELS_OF_CALIBRATION: Final = "levels_of_calibration"
-"""Key in ``[meta]`` of a calibrated fleet: fingerprints of the levels that it was calibrated to."""
+OF_TRANSFER: Final = ("housing.", "radiation.", "masuda.position_m", "motor.position_m")
+OUTSIDE_TRANSFER: Final = ("housing.loss_factor",)
+"""Parameters that transfer vectors depend on, minutes of work for each value, and those among them that are none."""
 
-OFFSET: Final = "level_offset_db"
 SILENCE_DB: Final = -200.0
-SMALLEST_SIGMA_DB: Final = 1e-3
 
-Motion: TypeAlias = tuple[float, float]
-"""Peak-to-peak transmission error and static compression in m: all that the meshing noise depends on."""
+Motion: TypeAlias = tuple[float, float, BearingForces]
+"""Peak-to-peak transmission error and static compression in m, all that the meshing noise depends on; the forces."""
 
 Values: TypeAlias = Mapping[str, float]
 Key: TypeAlias = tuple[tuple[str, float], ...]
-
-
-def fingerprint(datum: MeasuredLevel) -> str:
-    """Return a short hash of what was measured, where and at which speed and torque; names do not count."""
-    state = f"{datum.condition.motor_hz:.6g} {datum.condition.torque_n_m:.6g}"
-    place = f"{datum.receiver.distance_m:.6g} {datum.receiver.position_m}"
-    text = f"{state} {place} {datum.what} {datum.weighting} {datum.level_db:.6g}"
-    return hashlib.sha256(text.encode()).hexdigest()[:12]
-
-
-def offset_name(campaign: str) -> str:
-    """Return the name of the parameter that adds to all levels of a campaign."""
-    return f"{OFFSET}[{campaign}]"
-
-
-@dataclass(frozen=True)
-class MeasuredLevel:
-    """A level that the model is held against.
-
-    Parameters
-    ----------
-    condition : Condition
-    receiver : Receiver
-    level_db : float
-    sigma_db : float
-        One standard deviation of the measurement, at least 0.001.
-    weighting : {"Z", "A"}
-    origin : {"measured", "synthetic", "printed"}
-    source : str
-        Where it comes from, in words.
-    what : str
-        ``"overall"``, or the part of the sound it is of, in words: ``"1/3 octave 1000 Hz"``.
-    band_hz : (float, float), optional
-        Only lines of the model in this band count.
-    group : str
-        Condition of the campaign that it is left out with. Default: the condition's name.
-    campaign : str
-        Where several are fitted together.
-
-    Raises
-    ------
-    FittingError
-        A level that is no number, or a standard deviation that is not above zero.
-    """
-
-    condition: Condition
-    receiver: Receiver
-    level_db: float
-    sigma_db: float
-    weighting: Literal["Z", "A"]
-    origin: str
-    source: str
-    what: str = "overall"
-    band_hz: tuple[float, float] | None = None
-    group: str = ""
-    campaign: str = ""
-
-    def __post_init__(self) -> None:
-        if not (math.isfinite(self.sigma_db) and self.sigma_db >= SMALLEST_SIGMA_DB):
-            raise FittingError(
-                f"condition {self.condition.name}: the level's standard deviation must be > 0 dB "
-                f"(at least {SMALLEST_SIGMA_DB:g}), got {self.sigma_db!r}"
-            )
-        if not math.isfinite(self.level_db):
-            raise FittingError(f"condition {self.condition.name}: the level must be a number, got {self.level_db!r}")
-        object.__setattr__(self, "group", self.group or self.condition.name)
-
-    @property
-    def place(self) -> tuple[object, ...]:
-        """What the model needs to know of it."""
-        return self.condition, self.receiver, self.weighting, self.band_hz, self.campaign
-
-    def hears(self, frequency_hz: float) -> bool:
-        """Whether a line of this frequency is part of it."""
-        return self.band_hz is None or self.band_hz[0] <= frequency_hz < self.band_hz[1]
 
 
 @dataclass
@@ -153,10 +83,13 @@ class LevelModel:
     fleet : Fleet
     data : sequence of MeasuredLevel
         Speed or torque of a condition that are those of the fleet's kinematics or torque law follow these.
+    housing : HousingSound, optional
+        The housing's transfer vectors, with all receivers of the data, where the fleet's method needs them.
     """
 
-    def __init__(self, fleet: Fleet, data: Sequence[MeasuredLevel]) -> None:
+    def __init__(self, fleet: Fleet, data: Sequence[MeasuredLevel], housing: HousingSound | None = None) -> None:
         self.fleet = fleet
+        self.housing = housing
         self.data = tuple(data)
         self.conditions = tuple(dict.fromkeys(datum.condition for datum in data))
         self._places = tuple(datum.place for datum in data)
@@ -174,7 +107,7 @@ class LevelModel:
         """
         if tuple(datum.place for datum in data) != self._places:
             raise FittingError("levels of other conditions or receivers need a model of their own")
-        made = LevelModel(self.fleet, data)
+        made = LevelModel(self.fleet, data, self.housing)
         made._computed, made._response = self._computed, self._response
         return made
 
@@ -195,21 +128,22 @@ class LevelModel:
         """
         of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
         gain = {part: values.get(key, self._gains[key]) - self._gains[key] for key, part in GAINS.items()}
-        motor, gears = self._part("motor", of_fleet), self._gears_db(of_fleet, exact)
-        total = 10.0 * np.log10(10.0 ** (0.1 * (motor + gain["motor"])) + 10.0 ** (0.1 * (gears + gain["gears"])))
+        mesh, structure = np.split(self._gears_db(of_fleet, exact), 2)
+        levels = {"motor": self._part("motor", of_fleet), "mesh": mesh, "structure": structure}
+        total = 10.0 * np.log10(sum(10.0 ** (0.1 * (level + gain[path])) for path, level in levels.items()))
         if len(of_fleet) < len(values):
             total = total + np.array([values.get(offset_name(datum.campaign), 0.0) for datum in self.data])
-        return np.where(np.maximum(motor, gears) <= SILENCE_DB, SILENCE_DB, total)
+        return np.where(np.max(list(levels.values()), axis=0) <= SILENCE_DB, SILENCE_DB, total)
 
     def sounds(self, values: Values) -> tuple[DriveSound, ...]:
         """Return the drive's sound in each condition, with all contributions, for values of parameters by key."""
         fleet = self._fleet(values)
         unit, motions = self._motion(fleet, values)
-        model = DriveModel(fleet, unit)
+        model = DriveModel(fleet, unit, self.housing)
         held = zip(self.conditions, self._conditions(fleet, values), motions, strict=True)
         return tuple(
-            model.sound(condition, model.masuda_db(condition, *motion), self._receivers(known))
-            for known, condition, motion in held
+            model.sound(condition, model.masuda_db(condition, dte_m, static_m), self._receivers(known), forces)
+            for known, condition, (dte_m, static_m, forces) in held
         )
 
     def prepare(self, free: Sequence[FreeParameter]) -> float | None:
@@ -245,7 +179,7 @@ class LevelModel:
         return self._part("gears", values)
 
     def _part(self, part: Literal["motor", "gears"], values: Values) -> Real:
-        """Return the level of the motor, or of the gears' paths, for each datum, with the fleet's own gains."""
+        """Return the level of the motor, or of mesh and structure one after the other, with the fleet's own gains."""
         others = ("model.", *(OF_GEARS if part == "motor" else OF_MOTOR))
         kept = {name: value for name, value in values.items() if name not in GAINS and not name.startswith(others)}
         key = (part, tuple(sorted(kept.items())))
@@ -257,7 +191,7 @@ class LevelModel:
                 if not kept:
                     raise
                 self._computed.failures.append(str(error).removeprefix(f"{self.fleet.path}: "))
-                found = np.full(len(self.data), math.nan)
+                found = np.full(len(self.data) * (1 if part == "motor" else 2), math.nan)
             found.flags.writeable = False
             self._computed.parts[key] = found
         return found
@@ -267,16 +201,20 @@ class LevelModel:
         conditions = self._conditions(fleet, values)
         if part == "motor":
             of_gears = any(name.startswith(DYNAMIC) for name in values)
-            model = DriveModel(fleet, None if of_gears else self._motion(self.fleet, {})[0])
-            found = [model.motor_sources(condition) for condition in conditions]
-        else:
-            unit, motions = self._motion(fleet, values)
-            model = DriveModel(fleet, unit)
-            found = [
-                model.gear_sources(condition, model.masuda_db(condition, *motion))
-                for condition, motion in zip(conditions, motions, strict=True)
-            ]
-        sources = dict(zip(self.conditions, found, strict=True))
+            model = DriveModel(fleet, None if of_gears else self._motion(self.fleet, {})[0], self.housing)
+            return self._at_data(model, [model.motor_sources(condition) for condition in conditions])
+        unit, motions = self._motion(fleet, values)
+        model = DriveModel(fleet, unit, self.housing)
+        mesh, structure = [], []
+        for condition, (dte_m, static_m, forces) in zip(conditions, motions, strict=True):
+            mesh.append(model.gear_sources(condition, model.masuda_db(condition, dte_m, static_m)))
+            added = "structure" in model.field.adds
+            structure.append(model.field.structure_sources(forces) if added else ())
+        return np.concatenate([self._at_data(model, mesh), self._at_data(model, structure)])
+
+    def _at_data(self, model: DriveModel, of_conditions: Sequence[Sequence[SoundSource]]) -> Real:
+        """Return the level of the conditions' sources for each datum."""
+        sources = dict(zip(self.conditions, of_conditions, strict=True))
         return np.array([_level_db(model, sources[datum.condition], datum) for datum in self.data])
 
     def _fleet(self, values: Values) -> Fleet:
@@ -296,9 +234,11 @@ class LevelModel:
         key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(DYNAMIC)))
         known = self._computed.motions
         if key not in known:
-            model = DriveModel(fleet)
+            model = DriveModel(fleet, housing=self.housing)
             states = [model.motion(condition) for condition in self._conditions(fleet, values)]
-            known[key] = (model.unit, tuple((state.dte_pp_m, state.static_compression_m) for state in states))
+            forces = [bearing_forces(model.unit.system, state) for state in states]
+            held = zip(states, forces, strict=True)
+            known[key] = model.unit, tuple((s.dte_pp_m, s.static_compression_m, of) for s, of in held)
         return known[key]
 
 

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive import Condition, Receiver
-from tdacoustic.fitting.levels import OFFSET, SILENCE_DB, LevelModel, MeasuredLevel
+from tdacoustic.fitting.levels import SILENCE_DB, LevelModel
+from tdacoustic.fitting.measured_level import OFFSET, MeasuredLevel
 from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.residuals import LevelResiduals, shared
@@ -93,7 +94,7 @@ def next_measurements(
         return ()
     model, sigma_db = residuals.model, residuals.model_sigma_db
     asked = [MeasuredLevel(c.condition, c.receiver, 0.0, c.sigma_db, "Z", "", "") for c in candidates]
-    new = LevelModel(model.fleet, asked)
+    new = LevelModel(model.fleet, asked, model.housing)
     levels = new.levels_db(found.values)
     slopes = np.stack([_slope(new, found, parameter) for parameter in moved], axis=1)
     of_data = residuals.unweighted(found.jacobian[: found.n_data])

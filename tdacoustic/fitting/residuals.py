@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive import Condition
-from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+from tdacoustic.fitting.levels import LevelModel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 
 __all__ = ["LevelResiduals", "StateResiduals", "same_state", "shared", "states_of"]
 

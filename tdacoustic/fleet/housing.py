@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from tdacoustic.fleet.parameter import Parameter
+from tdacoustic.fleet.parameter import Parameter, default
 from tdacoustic.fleet.values import LossFactor, Point, Stiffness, Triple
 from tdacoustic.toml_models import Positive, Table, Text
 
@@ -14,36 +14,37 @@ __all__ = ["Housing", "HousingSeat", "Material"]
 
 
 class Material(Table):
-    """``[housing.material]``.
+    """``[housing.material]``; steel where the file does not say.
 
     Parameters
     ----------
-    modulus_gpa, density_kg_m3, poisson : Parameter of float or None
+    modulus_gpa, density_kg_m3, poisson : Parameter of float
     """
 
-    modulus_gpa: Parameter[Positive] | None = None
-    density_kg_m3: Parameter[Positive] | None = None
-    poisson: Parameter[Annotated[float, Field(ge=0.0, lt=0.5)]] | None = None
+    modulus_gpa: Parameter[Positive] = default(210.0)
+    density_kg_m3: Parameter[Positive] = default(7850.0)
+    poisson: Parameter[Annotated[float, Field(ge=0.0, lt=0.5)]] = default(0.3)
 
 
 class HousingSeat(Table):
-    """One ``[[housing.seat]]``: where bearings of a shaft sit.
+    """One ``[[housing.seat]]``: where the two bearings of a shaft sit, one in each bearing panel.
 
     Parameters
     ----------
     shaft : str
         ``"pinion"`` or ``"wheel"``.
     position_m : Parameter of (float, float, float) or None
+        In the drive frame: x and z of the shaft, y of its gear.
     radius_m, thickness_mm : Parameter of float or None
-    stiffness_n_per_m : Parameter of (float, float, float) or None
-        Of the springs at the seat along x, y, z; one number stands for all.
+    stiffness_n_per_m : Parameter of (float, float, float)
+        Of the springs at each of the two seats along x, y, z; one number stands for all.
     """
 
     shaft: Literal["pinion", "wheel"]
     position_m: Parameter[Point] | None = None
     radius_m: Parameter[Positive] | None = None
     thickness_mm: Parameter[Positive] | None = None
-    stiffness_n_per_m: Parameter[Stiffness] | None = None
+    stiffness_n_per_m: Parameter[Stiffness] = default((2e7, 2e7, 2e7))
 
 
 class Housing(Table):
@@ -52,11 +53,14 @@ class Housing(Table):
     Parameters
     ----------
     size_m : Parameter of (float, float, float) or None
+        Along the shafts, along travel, up.
+    position_m : Parameter of (float, float, float)
+        Of its middle, in the drive frame.
     wall_mm, bearing_panel_mm, top_bottom_mm : Parameter of float or None
         Thicknesses.
     material : Material
-    loss_factor : Parameter of float or None
-    hanger_stiffness_n_per_m : Parameter of (float, float, float) or None
+    loss_factor : Parameter of float
+    hanger_stiffness_n_per_m : Parameter of (float, float, float)
         Along x, y, z; one number stands for all.
     step_file : Parameter of str or None
         Path, relative to the fleet file.
@@ -64,11 +68,12 @@ class Housing(Table):
     """
 
     size_m: Parameter[Triple] | None = None
+    position_m: Parameter[Point] = default((0.0, 0.0, 0.0))
     wall_mm: Parameter[Positive] | None = None
     bearing_panel_mm: Parameter[Positive] | None = None
     top_bottom_mm: Parameter[Positive] | None = None
     material: Material = Material()
-    loss_factor: Parameter[LossFactor] | None = None
-    hanger_stiffness_n_per_m: Parameter[Stiffness] | None = None
+    loss_factor: Parameter[LossFactor] = default(0.02)
+    hanger_stiffness_n_per_m: Parameter[Stiffness] = default((2e7, 2e7, 2e7))
     step_file: Parameter[Text] | None = None
     seat: tuple[HousingSeat, ...] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal
 
 from tdacoustic.fleet.parameter import Parameter, default
+from tdacoustic.fleet.values import Point
 from tdacoustic.toml_models import Table
 
 __all__ = ["Masuda"]
@@ -23,9 +24,13 @@ class Masuda(Table):
         What X is: ``"um_pp"`` or ``"static_ratio"``.
     weighting : Parameter of str
         ``"Z"`` or ``"A"``.
+    position_m : Parameter of (float, float, float) or None
+        Of the free point source, in the drive frame. Default: the drive's centre; with a housing, 0.1 m above the
+        middle of its top.
     """
 
     constant_db: Parameter[float] = default(20.0, "paper, equation (8)")
     placement: Parameter[Literal["free", "inside", "off"]] = default("free")
     displacement: Parameter[Literal["um_pp", "static_ratio"]] = default("um_pp")
     weighting: Parameter[Literal["Z", "A"]] = default("Z")
+    position_m: Parameter[Point] | None = None

@@ -8,7 +8,7 @@ from tdacoustic.campaign import Campaign
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.fleet import Fleet
 from tdacoustic.results.analysis import Analysis, LogInput
-from tdacoustic.steps.record import versions
+from tdacoustic.steps.record import Record, versions
 
 __all__ = ["CampaignCalibration", "SpeedLevel"]
 
@@ -47,6 +47,8 @@ class CampaignCalibration:
         Every file that went in.
     over_speed : tuple of SpeedLevel
         Of the campaign's conditions and of those of ``[operation]`` that it does not have, by speed.
+    records : tuple of (str, Record)
+        Key and record of the steps behind the housing's transfer vectors.
     """
 
     campaign: Campaign
@@ -55,6 +57,7 @@ class CampaignCalibration:
     calibration: Calibration
     inputs: tuple[LogInput, ...]
     over_speed: tuple[SpeedLevel, ...] = ()
+    records: tuple[tuple[str, Record], ...] = ()
 
     @property
     def versions(self) -> dict[str, str]:

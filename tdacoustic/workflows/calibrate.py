@@ -15,8 +15,9 @@ from tdacoustic.steps.execution import Progress
 from tdacoustic.workflows.runs import fleet_input, written_inputs
 
 if TYPE_CHECKING:
+    from tdacoustic.drive import HousingSound
     from tdacoustic.fitting.calibration import Calibration
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
     from tdacoustic.fleet import Fleet
     from tdacoustic.results import Analysis, CampaignCalibration, SpeedLevel
 
@@ -55,7 +56,9 @@ def calibrate(
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
     from tdacoustic.workflows.calibration_setup import candidates_of, fit_settings, free_parameters
+    from tdacoustic.workflows.housing_sound import housing_sound
     from tdacoustic.workflows.joint_levels import joint_levels
+    from tdacoustic.workflows.microphones import microphones
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
@@ -66,6 +69,8 @@ def calibrate(
         analysis = _analyzed(campaign, store, jobs, progress)
     joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
     free, transferred, earlier = free_parameters(campaign, fleet, joint.campaigns)
+    places = (*microphones(campaign, fleet).values(), *(datum.receiver for datum in joint.data))
+    housing, records = housing_sound(fleet, store, jobs, progress, places)
     if progress is not None:
         progress("calibrating", 0, 1)
     with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
@@ -78,14 +83,15 @@ def calibrate(
             candidates=candidates_of(campaign, fleet, joint.data),
             transferred=transferred,
             earlier=earlier,
+            housing=housing,
         )
-        over_speed = _over_speed(fleet, found, joint.data)
+        over_speed = _over_speed(fleet, found, joint.data, housing)
     doubts = (*joint.doubts, *_doubts_of_lines(analysis, joint.data), *found.doubts)
     found = replace(found, doubts=tuple(dict.fromkeys(doubts)))
     own = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
     prior_fleet = campaign.calibration.prior_fleet
     prior = () if prior_fleet is None else (fleet_input(prior_fleet, "prior fleet"),)
-    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *prior), over_speed)
+    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *prior), over_speed, records)
 
 
 def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -> list[str]:
@@ -102,7 +108,9 @@ def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -
     ]
 
 
-def _over_speed(fleet: Fleet, found: Calibration, data: Sequence[MeasuredLevel]) -> tuple[SpeedLevel, ...]:
+def _over_speed(
+    fleet: Fleet, found: Calibration, data: Sequence[MeasuredLevel], housing: HousingSound | None
+) -> tuple[SpeedLevel, ...]:
     """The model's level in the conditions of the data and of the fleet, before and after."""
     from tdacoustic.drive import DriveModel, conditions_of
     from tdacoustic.results import SpeedLevel
@@ -112,8 +120,8 @@ def _over_speed(fleet: Fleet, found: Calibration, data: Sequence[MeasuredLevel])
         conditions = {**{condition.name: condition for condition in conditions_of(fleet)}, **conditions}
     by_speed = sorted(conditions.values(), key=lambda condition: condition.train_speed_km_h)
     sides = []
-    for model in (DriveModel(fleet), DriveModel(found.fleet)):
-        sounds = [model.sound(condition, model.gears(condition).masuda_db) for condition in by_speed]
+    for model in (DriveModel(fleet, housing=housing), DriveModel(found.fleet, housing=housing)):
+        sounds = [model.sound_of(model.gears(condition)) for condition in by_speed]
         sides.append([sound.level_db(model.field.surface.name) for sound in sounds])
     return tuple(
         SpeedLevel(condition.name, condition.train_speed_km_h, *(math.nan if x is None else x for x in levels))

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
     from tdacoustic.drive import Receiver
     from tdacoustic.fitting import FreeParameter
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
     from tdacoustic.fitting.next_measurement import Candidate
     from tdacoustic.fitting.settings import FitSettings
     from tdacoustic.fitting.transfer import Transferred
@@ -57,7 +57,7 @@ def free_parameters(
     """
     from tdacoustic.fitting import FreeParameter
     from tdacoustic.fitting.calibration import free_parameter
-    from tdacoustic.fitting.levels import offset_name
+    from tdacoustic.fitting.measured_level import offset_name
     from tdacoustic.fitting.parameters import lmfit_parameters
     from tdacoustic.fitting.transfer import transferred_priors
     from tdacoustic.fleet import load_fleet

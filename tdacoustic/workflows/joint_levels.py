@@ -10,7 +10,7 @@ from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import CampaignError
 
 if TYPE_CHECKING:
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
     from tdacoustic.fleet import Fleet
     from tdacoustic.results import Analysis, LogInput
     from tdacoustic.steps import Store

@@ -12,7 +12,7 @@ from tdacoustic.workflows.usable_recordings import NEAR, SURFACE_M, UsableRecord
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign, CampaignRun
     from tdacoustic.drive import Condition
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
     from tdacoustic.fleet import Fleet
     from tdacoustic.results import Analysis
     from tdacoustic.steps import Store
@@ -127,7 +127,7 @@ def _recorded(
 def _stated(campaign: Campaign, conditions: Mapping[str, Condition]) -> tuple[list[MeasuredLevel], list[str]]:
     """Levels of ``[[level]]``."""
     from tdacoustic.drive import Receiver
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
     found, doubts = [], []
     standing = "measured" if campaign.origin == "measured" else "printed"  # a synthetic campaign makes no levels

@@ -26,6 +26,7 @@ def predict(
     progress: Progress | None = None,
     conditions: Iterable[Condition] | None = None,
     receivers: Sequence[Receiver] = (),
+    jobs: int | None = None,
 ) -> FleetPrediction:
     """Compute the model of a fleet over its ``[operation]``, or over other conditions.
 
@@ -34,13 +35,15 @@ def predict(
     fleet : path or Fleet
         The file, or the folder it is in.
     store : path or Store, optional
-        Where the sweep is kept; default `tdacoustic.steps.default_store_path`.
+        Where sweep and transfer vectors are kept; default `tdacoustic.steps.default_store_path`.
     progress : callable, optional
     conditions : iterable of Condition, optional
         Instead of those of ``[operation]``. The sweep of speed needs the fleet's torque law also then; where that is
         missing the sweep is left out, and a doubt says so.
     receivers : sequence of Receiver
         Where levels are wanted besides the 4 m surface.
+    jobs : int, optional
+        Processes for transfer vectors that are not there yet; default one a core.
 
     Returns
     -------
@@ -53,16 +56,18 @@ def predict(
     """
     from threadpoolctl import threadpool_limits
 
-    from tdacoustic.drive import DriveModel
+    from tdacoustic.drive import DriveModel, conditions_of
     from tdacoustic.results import FleetPrediction, LogInput
     from tdacoustic.tables import predicted_tables
+    from tdacoustic.workflows.housing_sound import housing_sound
 
     fleet = fleet if isinstance(fleet, Fleet) else load_fleet(fleet)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
-    model = DriveModel(fleet)
-    held = model.conditions if conditions is None else tuple(conditions)
+    held = conditions_of(fleet) if conditions is None else tuple(conditions)
     if not held:
         raise FleetError(f"{fleet.path}: there is no condition to compute: no speed is known")
+    housing, transfer_records = housing_sound(fleet, store, jobs, progress, receivers)
+    model = DriveModel(fleet, housing=housing)
     with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
         prediction = model.evaluate(held, receivers)
     sweep, records, doubts = _sweep(model, max(condition.train_speed_km_h for condition in held), store, progress)
@@ -70,7 +75,7 @@ def predict(
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)
     file = log_file(fleet.path)
     inputs = (LogInput(fleet.path.name, file.sha256, file.n_bytes, "TOML"),)
-    return FleetPrediction(fleet, prediction, tables, inputs, records)
+    return FleetPrediction(fleet, prediction, tables, inputs, (*transfer_records, *records))
 
 
 def _sweep(

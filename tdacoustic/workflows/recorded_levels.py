@@ -14,7 +14,7 @@ from tdacoustic.workflows.usable_recordings import SURFACE_M, UsableRecordings, 
 
 if TYPE_CHECKING:
     from tdacoustic.drive import Condition, Receiver
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
 __all__ = ["band_edges_hz", "band_levels", "receiver_levels", "surface_levels"]
 
@@ -127,7 +127,7 @@ def _datum(
     what: str = "overall",
     band_hz: tuple[float, float] | None = None,
 ) -> MeasuredLevel:
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
     return MeasuredLevel(
         condition=condition,

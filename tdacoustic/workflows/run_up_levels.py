@@ -19,7 +19,7 @@ from tdacoustic.workflows.usable_recordings import SURFACE_M, UsableRecordings
 
 if TYPE_CHECKING:
     from tdacoustic.drive import Condition
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
     from tdacoustic.fleet import Fleet, Kinematics
     from tdacoustic.measured.runs import MeasuredRun
     from tdacoustic.speed import SpeedProfile
@@ -96,7 +96,7 @@ def order_levels(usable: UsableRecordings, fleet: Fleet) -> tuple[list[MeasuredL
 
 def _datum(usable: UsableRecordings, name: str, speed: _Speed, mean: MeanLevel) -> MeasuredLevel:
     from tdacoustic.drive import Receiver
-    from tdacoustic.fitting.levels import MeasuredLevel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
     return MeasuredLevel(
         condition=speed.condition,

@@ -51,7 +51,8 @@ import tdacoustic as td
 from tdacoustic.drive import Receiver
 from tdacoustic.fitting.calibration import calibrate_fleet
 from tdacoustic.fitting.free import free_parameter
-from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+from tdacoustic.fitting.levels import LevelModel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.fitting.settings import FitSettings
 
 TRUTH = Truth.draw(8)

@@ -1,14 +1,11 @@
 """Fleets that these tests share."""
 
-from pathlib import Path
-
 import pytest
+from plain_fleets import plain_fleet
 
 from tdacoustic.fleet import load_fleet
-
-CALIBRATION = Path(__file__).resolve().parents[2] / "calibration"
 
 
 @pytest.fixture(scope="session")
 def reference():
-    return load_fleet(CALIBRATION / "reference-drive")
+    return load_fleet(plain_fleet("reference-drive"))

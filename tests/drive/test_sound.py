@@ -116,8 +116,8 @@ def test_the_directivity_of_one_point_is_round_and_of_two_is_not(fleet_of):
     [
         ('placement = "free"', 'placement = "off"', False, "is off"),
         ('placement = "free"', 'placement = "inside"', False, "inside the housing"),
-        ('gear_path = "masuda"', 'gear_path = "structure"', False, "way through the housing is not there yet"),
-        ('gear_path = "masuda"', 'gear_path = "sum"', True, "way through the housing is not there yet"),
+        ('gear_path = "masuda"', 'gear_path = "structure"', False, "way through the housing takes method"),
+        ('gear_path = "masuda"', 'gear_path = "sum"', True, "way through the housing takes method"),
     ],
 )
 def test_what_the_total_adds_is_said(fleet_of, old, new, adds, doubt):

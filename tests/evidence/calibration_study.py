@@ -138,6 +138,7 @@ class Truth:
         given |= {key: 0.05 for key in (DAMPING, BEARINGS) if key in free}
         text = REFERENCE_DRIVE.read_text(encoding="utf-8")
         for pattern, line in (
+            (r'method = "boundary_elements"', 'method = "point_sources"'),
             (r"constant_db = .*", f"constant_db = {given[CONSTANT]!r}"),
             (r"mesh_damping_ratio = .*", f"mesh_damping_ratio = {given[DAMPING]!r}"),
             (r"bearing_damping_ratio = .*", f"bearing_damping_ratio = {given[BEARINGS]!r}"),
@@ -213,7 +214,8 @@ def _model(truth: Truth, free: tuple[str, ...]) -> tuple[Any, Any]:
     """The fleet that the program is given, and its model; what that computed is kept from seed to seed."""
     from tdacoustic import DriveModel, load_fleet
     from tdacoustic.drive import Receiver
-    from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+    from tdacoustic.fitting.levels import LevelModel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
     with TemporaryDirectory() as folder:
         path = Path(folder) / "fleet.toml"

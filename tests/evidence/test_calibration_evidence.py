@@ -108,7 +108,8 @@ def test_the_model_is_the_truth_where_both_have_the_same_parameters(study, name,
     import tdacoustic as td
     from tdacoustic.drive import Receiver
     from tdacoustic.fitting.free import free_parameter
-    from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+    from tdacoustic.fitting.levels import LevelModel
+    from tdacoustic.fitting.measured_level import MeasuredLevel
 
     truth = study.Truth.draw(0)
     path = tmp_path / "fleet.toml"

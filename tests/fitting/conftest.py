@@ -1,16 +1,16 @@
 """A fleet whose levels motor and meshing share, and levels of its model with other values."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_fleets import plain_fleet
 
 import tdacoustic as td
 from tdacoustic.drive import Receiver
-from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+from tdacoustic.fitting.levels import LevelModel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 
-CALIBRATION = Path(__file__).resolve().parents[2] / "calibration"
 CONSTANT, DAMPING, GAIN = "masuda.constant_db", "gear_dynamics.mesh_damping_ratio", "model.motor_gain_db"
 MOTOR = """
 [[motor.excitation]]
@@ -27,7 +27,7 @@ sound_power_level_db = 100
 @pytest.fixture(scope="session")
 def shared_fleet(tmp_path_factory):
     """The reference drive with two constant tones of the motor: 82.4 dB of it at 4 m."""
-    text = (CALIBRATION / "reference-drive" / "fleet.toml").read_text(encoding="utf-8")
+    text = plain_fleet("reference-drive").read_text(encoding="utf-8")
     path = tmp_path_factory.mktemp("fleet") / "fleet.toml"
     assert "[motor]" in text
     start = text.index("[housing]") if "[housing]" in text else len(text)

@@ -1,25 +1,25 @@
 """A fleet fitted to levels: recovery without scatter, and doubts where the data cannot tell."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
+from plain_fleets import plain_fleet
 
 import tdacoustic as td
 from tdacoustic.drive import Receiver
 from tdacoustic.errors import FittingError
 from tdacoustic.fitting.calibration import calibrate_fleet, free_parameter
-from tdacoustic.fitting.levels import LevelModel, MeasuredLevel
+from tdacoustic.fitting.levels import LevelModel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.fitting.settings import FitSettings
 
-CALIBRATION = Path(__file__).resolve().parents[2] / "calibration"
 CONSTANT, DAMPING = "masuda.constant_db", "gear_dynamics.mesh_damping_ratio"
 TRUTH = {CONSTANT: -3.0, DAMPING: 0.08}
 
 
 @pytest.fixture(scope="module")
 def fleet():
-    return td.load_fleet(CALIBRATION / "reference-drive")
+    return td.load_fleet(plain_fleet("reference-drive"))
 
 
 @pytest.fixture(scope="module")

@@ -18,7 +18,7 @@ import tdacoustic as td
 from tdacoustic.drive import Receiver
 from tdacoustic.fitting.calibration import calibrate_fleet
 from tdacoustic.fitting.free import free_parameter
-from tdacoustic.fitting.levels import MeasuredLevel
+from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.fitting.settings import FitSettings
 from tdacoustic.gears import ContactLines, GearSystem, steady_state
 

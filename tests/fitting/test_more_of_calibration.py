@@ -12,7 +12,7 @@ from tdacoustic.errors import FittingError
 from tdacoustic.fitting import FreeParameter, fit
 from tdacoustic.fitting.calibration import calibrate_fleet, free_parameter
 from tdacoustic.fitting.intervals import profile_intervals
-from tdacoustic.fitting.levels import offset_name
+from tdacoustic.fitting.measured_level import offset_name
 from tdacoustic.fitting.next_measurement import Candidate
 from tdacoustic.fitting.posterior import sample_posterior
 from tdacoustic.fitting.settings import FitSettings, PosteriorSettings

@@ -1,20 +1,24 @@
 """The report of a calibration: what is measured, printed, assumed and calculated is told apart."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
+from plain_fleets import plain_campaign, plain_fleet
 
 import tdacoustic as td
 from tdacoustic.reporting.calibration_report import calibration_report
 from tdacoustic.reporting.document import FigureBlock, Paragraph, Sentences, Table, walk
 from tdacoustic.reporting.html import render_html
+from tdacoustic.reporting.sections.calibration_figures import contributions_figure
+from tdacoustic.reporting.sections.calibration_tables import contributions_table
 
 ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def printed(tmp_path_factory):
-    return td.calibrate(ROOT / "recordings" / "crrc-freight-printed", tmp_path_factory.mktemp("store"))
+    return td.calibrate(plain_campaign("crrc-freight-printed"), tmp_path_factory.mktemp("store"))
 
 
 @pytest.fixture(scope="module")
@@ -61,6 +65,27 @@ def test_contributions_and_levels_add_up(blocks, printed):
         assert row[4] == "printed"
 
 
+def test_the_structure_is_shown_before_and_after_where_it_has_a_level(printed):
+    def with_structure(sound):
+        levels = [dataclasses.replace(e, level_db=60.0) if e.path == "structure" else e for e in sound.levels]
+        return dataclasses.replace(sound, levels=tuple(levels))
+
+    calibration = printed.calibration
+    assert "structure_before_db" not in {c.key for c in contributions_table(calibration).columns}
+    held = dataclasses.replace(
+        calibration,
+        before=tuple(with_structure(sound) for sound in calibration.before),
+        after=tuple(with_structure(sound) for sound in calibration.after),
+    )
+    keys = [column.key for column in contributions_table(held).columns]
+    rows = [dict(zip(keys, row, strict=True)) for row in contributions_table(held).rows]
+    assert {(row["structure_before_db"], row["structure_after_db"]) for row in rows} == {(60.0, 60.0)}
+    drawn = contributions_figure(dataclasses.replace(printed, calibration=held))
+    assert {"structure, before", "structure, after"} < {element.name for element in drawn.elements}
+    assert "motor, meshing noise and structure contribute" in drawn.title
+    assert "the structure (bearing forces through the housing) is shown but not added" in drawn.caption
+
+
 def _log10(value):
     from math import log10
 
@@ -90,7 +115,7 @@ def test_rank_and_next_measurement_are_said(blocks, printed):
 
 def test_another_fleet_gets_no_numbers_of_the_paper(tmp_path):
     fleet = tmp_path / "fleet.toml"
-    text = (ROOT / "calibration" / "reference-drive" / "fleet.toml").read_text(encoding="utf-8")
+    text = plain_fleet("reference-drive").read_text(encoding="utf-8")
     fleet.write_text(text.replace("paper", "data sheet"), encoding="utf-8")
     level = '[[level]]\ncondition = "{}"\ndistance_m = {}\nlevel_db = {}\n'
     campaign = tmp_path / "campaign.toml"

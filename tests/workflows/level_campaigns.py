@@ -1,8 +1,7 @@
 """Makers of campaigns whose levels are known: tones over noise, analysed into a store of their own."""
 
-from pathlib import Path
-
 import numpy as np
+from plain_fleets import plain_fleet
 from small_campaigns import HEAD, RATE_HZ, run_table, table, write_log
 
 from tdacoustic import analyze
@@ -11,7 +10,7 @@ from tdacoustic.fleet import load_fleet
 from tdacoustic.steps import Store
 from tdacoustic.workflows.measured_levels import measured_levels
 
-REFERENCE = Path(__file__).resolve().parents[2] / "calibration" / "reference-drive" / "fleet.toml"
+REFERENCE = plain_fleet("reference-drive")
 
 
 def pascal(level_db):

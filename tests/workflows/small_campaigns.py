@@ -5,10 +5,11 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from plain_fleets import plain_fleet
 
 from tdacoustic.fleet import fleet_toml, load_fleet
 
-REFERENCE = Path(__file__).resolve().parents[2] / "calibration" / "reference-drive"
+REFERENCE = plain_fleet("reference-drive")
 RATE_HZ = 4096.0
 
 

@@ -5,14 +5,15 @@ import json
 from pathlib import Path
 
 import pytest
+from plain_fleets import plain_campaign, plain_fleet
 
 from tdacoustic.fleet import load_fleet
 
 ROOT = Path(__file__).resolve().parents[2]
 CHECKER = ROOT.parent / "shared" / "check_outputs.py"
-PRINTED = ROOT / "recordings" / "crrc-freight-printed"
+PRINTED = plain_campaign("crrc-freight-printed")
 HEAD = 'schema = "tdacoustic-campaign/1"\nname = "Made"\norigin = "printed"\n'
-FLEET = f'fleet = "{(ROOT / "calibration" / "reference-drive" / "fleet.toml").as_posix()}"\n'
+FLEET = f'fleet = "{plain_fleet("reference-drive").as_posix()}"\n'
 LEVEL = '[[level]]\ncondition = "{}"\ndistance_m = 4.0\nlevel_db = {}\nsigma_db = 0.5\n'
 
 
@@ -168,7 +169,7 @@ def test_all_that_a_parameter_can_be_given(tda, tmp_path):
         ('with_campaigns = ["../nowhere"]\n', "nowhere"),
         ('prior_fleet = "nowhere.toml"\n', "nowhere.toml"),
         (
-            f"prior_fleet = {json.dumps((ROOT / 'calibration' / 'reference-drive' / 'fleet.toml').as_posix())}\n",
+            f"prior_fleet = {json.dumps(plain_fleet('reference-drive').as_posix())}\n",
             "stderr",
         ),
         ('data = ["receivers"]\n', ""),
@@ -203,6 +204,7 @@ def test_the_same_name_twice_and_another_fleet_are_refused(tda, tmp_path):
     code, _, err = tda("calibrate", first, "-o", "out")
     assert code == 1
     assert "has the name 'First' of another one" in err
+    plain_fleet("crrc-freight")
     other = tmp_path / "second" / "campaign.toml"
     other.write_text(other.read_text().replace("reference-drive", "crrc-freight").replace('"First"', '"Second"'))
     code, _, err = tda("calibrate", first, "-o", "out")

@@ -1,9 +1,9 @@
 """Places of microphones in the drive's frame, and places that cannot be."""
 
 import math
-from pathlib import Path
 
 import pytest
+from plain_fleets import plain_fleet
 from small_campaigns import HEAD, table
 
 from tdacoustic.campaign import load_campaign
@@ -11,7 +11,7 @@ from tdacoustic.errors import CampaignError
 from tdacoustic.fleet import load_fleet
 from tdacoustic.workflows.microphones import microphone_doubts, microphones
 
-REFERENCE = Path(__file__).resolve().parents[2] / "calibration" / "reference-drive" / "fleet.toml"
+REFERENCE = plain_fleet("reference-drive")
 CENTRE_M = 0.5 * 1.05112
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 import pandas as pd
 import pytest
+from plain_fleets import plain_campaign, plain_fleet
 from small_campaigns import HEAD, MIC, files_of, fleet_campaign, run_table, small_campaign, table
 
 import tdacoustic as td
@@ -16,8 +17,8 @@ from tdacoustic.reporting.run_report import run_report
 
 ROOT = Path(__file__).resolve().parents[2]
 CHECKER = ROOT.parent / "shared" / "check_outputs.py"
-DEMONSTRATION = ROOT / "recordings" / "crrc-freight"
-PRINTED = ROOT / "recordings" / "crrc-freight-printed"
+DEMONSTRATION = plain_campaign("crrc-freight")
+PRINTED = plain_campaign("crrc-freight-printed")
 KINEMATICS_ALONE = 'schema = "tdacoustic-fleet/1"\n[train]\nwheel_diameter_mm = 1000\n[[gear_pair]]\nteeth = [20, 60]\n'
 
 
@@ -261,7 +262,7 @@ def test_a_campaign_file_that_contradicts_itself_is_an_error(tda, tmp_path):
 
 
 def test_torques_of_the_runs_stand_in_for_a_law_that_the_fleet_lacks(tda, tmp_path):
-    text = fleet_toml(load_fleet(ROOT / "calibration" / "reference-drive").replaced({}))
+    text = fleet_toml(load_fleet(plain_fleet("reference-drive")).replaced({}))
     operation = text[text.index("[operation]") : text.index("[masuda]")]
     campaign = fleet_campaign(tmp_path / "ride", "", text.replace(operation, ""))
     fleetless = run_table("a", logs=["a.h5"], torque_n_m=900.0)

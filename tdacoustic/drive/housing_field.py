@@ -1,0 +1,192 @@
+"""The sound field of a drive with its housing: transfer vectors in, levels out."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.drive.levels import PointField, Receiver
+from tdacoustic.drive.prediction import HousingFacts
+from tdacoustic.drive.sources import SoundSource, StructureSource
+from tdacoustic.fleet import Fleet
+from tdacoustic.gears import BearingForces
+from tdacoustic.housing import Box, HousingModes, seat_loads
+from tdacoustic.radiation.box_in_air import BoxInAir
+from tdacoustic.radiation.received import MeanVectors, PointVectors
+
+__all__ = ["HousingField", "HousingSound"]
+
+Real = NDArray[np.float64]
+Point = tuple[float, float, float]
+
+_REFERENCE_PA = 2e-5
+_MESH, _MOTOR = 0, 1
+"""Numbers of the sources in transfer vectors."""
+
+_OF_1_PA_AT_1_M_DB = 10.0 * math.log10(4.0 * math.pi)
+"""Sound power level, less its level at 1 m, of a point source."""
+
+
+@dataclass(frozen=True, eq=False)
+class HousingSound:
+    """The computed transfer vectors of a housing.
+
+    Parameters
+    ----------
+    box : Box
+        With the fleet's loss factor and gears.
+    body : BoxInAir
+    modes : HousingModes
+    mean : MeanVectors
+    points : PointVectors
+    """
+
+    box: Box
+    body: BoxInAir
+    modes: HousingModes
+    mean: MeanVectors
+    points: PointVectors
+
+    @cached_property
+    def places(self) -> dict[Point, int]:
+        """Numbers of the points by their coordinates."""
+        return {point: number for number, point in enumerate(self.points.points_m)}
+
+    @property
+    def range_hz(self) -> tuple[float, float]:
+        """Lowest and highest frequency of the transfer vectors."""
+        return float(self.mean.frequency_hz[0]), float(self.mean.frequency_hz[-1])
+
+    def reaches(self, frequency_hz: float) -> bool:
+        """Whether the transfer vectors hold at a frequency."""
+        low, high = self.range_hz
+        return low <= frequency_hz <= high
+
+
+class HousingField(PointField):
+    """The field of the housing that the bearing forces shake, and of point sources that the rigid housing scatters.
+
+    Masuda's level is that of a gear unit with its housing: the power of its source is held, and the housing gives it a
+    direction alone. The motor's sources keep their volume flow, so that the housing beside them changes their power.
+    Point sources at frequencies that the transfer vectors do not reach are those of free space.
+
+    A receiver without a position takes the level of the surface, moved to its distance with 1/R.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    housing : HousingSound
+    """
+
+    def __init__(self, fleet: Fleet, housing: HousingSound) -> None:
+        super().__init__(fleet)
+        self.housing = housing
+        self.mesh_position_m = housing.body.sources_m[_MESH]
+        self._loss_factor = fleet.number("housing.loss_factor")
+        self._gain_db = fleet.model.structure_gain_db.value
+        self._surface_db = super()._free_db(SoundSource("mesh", "", 1.0, 0.0), self.surface)
+
+    @property
+    def facts(self) -> HousingFacts:
+        """What the field was computed with."""
+        held = self.housing
+        sources = held.body.sources_m
+        return HousingFacts(
+            held.modes.mass_kg,
+            held.modes.frequency_hz[: held.modes.natural],
+            len(held.modes.frequency_hz) - held.modes.natural,
+            held.range_hz,
+            (held.box.share_of_left(held.box.seats[0]), held.box.share_of_left(held.box.seats[1])),
+            held.body.position_m,
+            sources[_MESH],
+            sources[_MOTOR] if len(sources) > _MOTOR else None,
+        )
+
+    def structure_sources(
+        self, forces: BearingForces | None, loss_factor: float | None = None
+    ) -> tuple[StructureSource, ...]:
+        """Return the tones of the housing under bearing forces, with ``[model] structure_gain_db``.
+
+        Parameters
+        ----------
+        forces : BearingForces or None
+        loss_factor : float, optional
+            Instead of the fleet's.
+        """
+        if forces is None:
+            return ()
+        held = self.housing
+        there = np.flatnonzero([held.reaches(frequency) for frequency in forces.frequency_hz])
+        if not len(there):
+            return ()
+        frequencies = forces.frequency_hz[there]
+        loads = seat_loads(held.box, forces)[:, :, there]
+        velocities = held.modes.response(frequencies, loads, self._loss_factor if loss_factor is None else loss_factor)
+        velocities = velocities * 10.0 ** (0.05 * self._gain_db)
+        found = []
+        for line, frequency, column in zip(there, frequencies.tolist(), velocities.T, strict=True):
+            square = 0.5 * held.mean.of_modes(frequency, column)
+            if square > 0.0:
+                level = 10.0 * math.log10(square / _REFERENCE_PA**2) - self._surface_db
+                name = _name(float(forces.harmonic[line]))
+                found.append(StructureSource("structure", name, frequency, level, held.body.position_m, column))
+        return tuple(found)
+
+    def transfer_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
+        """Return the level at receivers less the sound power level of a source, shape (receivers,)."""
+        if not self.housing.reaches(source.frequency_hz):
+            return super().transfer_db(source, receivers)
+        at_points = None
+        found = np.empty(len(receivers))
+        for number, receiver in enumerate(receivers):
+            if receiver.position_m is None:
+                moved = 20.0 * math.log10(self.surface.distance_m / receiver.distance_m)
+                found[number] = self._mean_db(source) + moved
+                continue
+            at_points = self._points_db(source) if at_points is None else at_points
+            found[number] = at_points[self.housing.places[receiver.position_m]]
+        return found
+
+    def _mean_db(self, source: SoundSource) -> float:
+        """Level on the surface less the sound power level."""
+        if isinstance(source, StructureSource) or source.path == "mesh":
+            return self._surface_db
+        square = self.housing.mean.of_source(source.frequency_hz, _MOTOR)
+        return 10.0 * math.log10(square) - _OF_1_PA_AT_1_M_DB
+
+    def _points_db(self, source: SoundSource) -> Real:
+        """Levels at all points less the sound power level."""
+        held = self.housing
+        if isinstance(source, StructureSource):
+            squares = 0.5 * held.points.of_modes(source.frequency_hz, source.velocities)
+            return _decibels(squares / _REFERENCE_PA**2) - source.sound_power_level_db
+        number = _MESH if source.path == "mesh" else _MOTOR
+        squares = held.points.of_source(held.body, source.frequency_hz, number)
+        if number == _MOTOR:
+            return _decibels(squares) - _OF_1_PA_AT_1_M_DB
+        return _decibels(squares / held.mean.of_source(source.frequency_hz, _MESH)) + self._surface_db
+
+    def doubts(self, sources: Sequence[SoundSource]) -> Iterator[str]:
+        """Yield what the reader must know of the reach of the transfer vectors."""
+        low, high = self.housing.range_hz
+        beyond = [s.frequency_hz for s in sources if not self.housing.reaches(s.frequency_hz)]
+        if beyond:
+            yield (
+                f"{len(beyond)} line{'s' if len(beyond) > 1 else ''} of point sources at {min(beyond):.0f} to "
+                f"{max(beyond):.0f} Hz lie outside of the {low:.0f} to {high:.0f} Hz that the housing is computed for: "
+                "they are not scattered by it"
+            )
+
+
+def _decibels(squares: Real) -> Real:
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(squares))
+
+
+def _name(harmonic: float) -> str:
+    return f"mesh x{harmonic:g}" if math.isfinite(harmonic) else "bearing forces"

@@ -1,0 +1,188 @@
+"""The sound of a box's vibrations and of point sources beside it, kept over frequency for any receiver.
+
+What is computed, node by node over frequency, are the multipoles (`multipoles`) of unit modal velocities and of the
+waves that the rigid box scatters; receivers inside the sphere where multipoles hold get their pressures directly. All
+else (means over spheres, directivities, microphones) follows without boundary elements.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.errors import RadiationError
+from tdacoustic.radiation.box_in_air import LEAST_ELEMENTS_PER_WAVELENGTH, BoxInAir
+from tdacoustic.radiation.interpolation import frequency_nodes
+from tdacoustic.radiation.surfaces import Surface
+
+__all__ = [
+    "LOWEST_HZ",
+    "TransferBand",
+    "TransferNodes",
+    "bands_of",
+    "frequencies_of",
+    "grid_hz_for",
+    "transfer_band",
+]
+
+Real = NDArray[np.float64]
+
+LOWEST_HZ: Final = 20.0
+
+GRID_LADDER_HZ: Final = (1000.0, 1300.0, 1600.0, 2000.0, 2500.0, 3000.0)
+"""Highest frequencies of grids; the first carries all lower frequencies too, because it must resolve the modes."""
+
+_PHASE_STEP: Final = 1.25
+"""Radians that the phase of the multipoles turns by, at most, from one frequency to the next."""
+
+_DENSE: Final = 13.0
+"""k times the radius up to which the frequencies lie twice as dense."""
+
+_AT_ONCE: Final = 8
+"""Frequencies of one task at most; tasks run side by side and are kept one by one."""
+
+
+@dataclass(frozen=True)
+class TransferBand:
+    """Some frequencies with one grid.
+
+    Parameters
+    ----------
+    frequency_hz : tuple of float
+    grid_hz : float
+    """
+
+    frequency_hz: tuple[float, ...]
+    grid_hz: float
+
+
+@dataclass(frozen=True)
+class TransferNodes:
+    """Fields at some frequencies.
+
+    Columns are unit modal velocities (m √kg / s), then unit sources (1 Pa at 1 m), of these what the box scatters,
+    times `BoxInAir.back_to_sources`.
+
+    Parameters
+    ----------
+    frequency_hz : tuple of float
+    multipoles : tuple of ndarray of complex64, each of shape (harmonics, columns)
+        As of `Multipoles`, which says how many there are.
+    near : ndarray of complex64, shape (frequencies, receivers, columns)
+        Pressures at the near receivers.
+    panels : int
+        Of the grid.
+    """
+
+    frequency_hz: tuple[float, ...]
+    multipoles: tuple[NDArray[np.complex64], ...]
+    near: NDArray[np.complex64]
+    panels: int
+
+
+def frequencies_of(body: BoxInAir, highest_hz: float) -> Real:
+    """Return the frequencies at which the field is computed, up to one.
+
+    Parameters
+    ----------
+    body : BoxInAir
+    highest_hz : float
+
+    Raises
+    ------
+    RadiationError
+        A highest frequency that is not above `LOWEST_HZ`, or that no grid can carry.
+    """
+    if not highest_hz > LOWEST_HZ:
+        raise RadiationError(f"max_frequency_hz must be above {LOWEST_HZ:g} Hz, got {highest_hz:g}")
+    radian_hz = body.sound_speed_m_s / (2.0 * math.pi * body.radius_m)
+    return frequency_nodes(LOWEST_HZ, highest_hz, _PHASE_STEP * radian_hz, _DENSE * radian_hz)
+
+
+def grid_hz_for(frequency_hz: float, highest_hz: float) -> float:
+    """Return the highest frequency of the grid that a frequency is computed on.
+
+    Examples
+    --------
+    >>> grid_hz_for(300.0, 3000.0), grid_hz_for(1400.0, 1500.0), grid_hz_for(4000.0, 5000.0)
+    (1000.0, 1500.0, 4687.5)
+    """
+    ladder = list(GRID_LADDER_HZ)
+    while ladder[-1] < highest_hz:
+        ladder.append(1.25 * ladder[-1])
+    rung = next(rung for rung in ladder if rung >= frequency_hz * (1.0 - 1e-9))
+    return max(GRID_LADDER_HZ[0], min(rung, highest_hz))
+
+
+def bands_of(body: BoxInAir, highest_hz: float) -> tuple[TransferBand, ...]:
+    """Return the frequencies by grid, few enough at once that two processes share the work.
+
+    Parameters
+    ----------
+    body : BoxInAir
+    highest_hz : float
+    """
+    found = []
+    nodes = frequencies_of(body, highest_hz)
+    for grid_hz, held in itertools.groupby(nodes.tolist(), lambda node: grid_hz_for(node, highest_hz)):
+        some = list(held)
+        count = math.ceil(len(some) / _AT_ONCE)
+        found += [TransferBand(tuple(part.tolist()), grid_hz) for part in np.array_split(some, count)]
+    body.surface(found[-1].grid_hz)
+    return tuple(found)
+
+
+def transfer_band(
+    body: BoxInAir,
+    band: TransferBand,
+    velocities_of: Callable[[Surface], Real],
+    done: Callable[[float], None] = lambda part: None,
+) -> TransferNodes:
+    """Compute the fields of one band.
+
+    Parameters
+    ----------
+    body : BoxInAir
+    band : TransferBand
+    velocities_of : callable
+        From a grid to the mean outward velocity of its panels, one column each: (panels, n).
+    done : callable
+        Told now and then which part is done.
+    """
+    surface = body.surface(band.grid_hz)
+    velocities = np.asarray(velocities_of(surface), dtype=np.float32)
+    multipoles, near = [], []
+    for number, frequency in enumerate(band.frequency_hz):
+        done(number / len(band.frequency_hz))
+        outgoing, close = _at_frequency(body, surface, velocities, frequency)
+        multipoles.append(outgoing)
+        near.append(close)
+    return TransferNodes(band.frequency_hz, tuple(multipoles), np.stack(near), surface.n_panels)
+
+
+def _at_frequency(body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float) -> Any:
+    """Return the multipoles of all columns and their pressures at the near receivers."""
+    from tdacoustic.radiation.boundary_elements import ExteriorProblem
+
+    wave, impedance = body.wave_number_rad_m(frequency_hz), body.impedance_pa_s_m
+    problem = ExteriorProblem(
+        surface, wave, impedance, body.ground_m, least_panels_per_wavelength=0.99 * LEAST_ELEMENTS_PER_WAVELENGTH
+    )
+    waves = body.waves(frequency_hz)
+    found = [waves.of_surface(surface, problem.pressures(velocities), velocities, impedance)]
+    near = [problem.transfer(body.near_m, velocities)] if body.near_m else []
+    if body.sources_m:
+        back = body.back_to_sources(frequency_hz)
+        found.append(waves.of_surface(surface, problem.blocked_pressures(body.sources_m), 0.0, impedance) * back)
+        if body.near_m:
+            scattered = problem.scattered(body.sources_m, body.near_m) - body.direct(frequency_hz, body.near_m)
+            near.append(scattered * back)
+    columns = velocities.shape[1] + len(body.sources_m)
+    close = np.concatenate(near, axis=1) if near else np.zeros((0, columns))
+    return np.concatenate(found, axis=1).astype(np.complex64), close.astype(np.complex64)

@@ -1,0 +1,103 @@
+"""The bearing forces' way through the housing in a calibration: gain and loss factor come back, the rest is refused."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_up_modes import HOUSING, sound_of_made_up_modes
+from plain_fleets import plain_fleet
+
+import tdacoustic as td
+from tdacoustic.drive import DriveModel, Receiver
+from tdacoustic.errors import FittingError
+from tdacoustic.fitting import FreeParameter
+from tdacoustic.fitting.calibration import calibrate_fleet, free_parameter
+from tdacoustic.fitting.levels import LevelModel
+from tdacoustic.fitting.measured_level import MeasuredLevel
+from tdacoustic.fitting.settings import FitSettings
+
+GAIN, LOSS = "model.structure_gain_db", "housing.loss_factor"
+SPEEDS = (20.0, 30.0, 40.0, 50.0, 60.0, 70.0)
+PLACES = (Receiver("4 m", 4.0), Receiver("beside", 4.0, (0.0, 4.0, 0.0)), Receiver("ahead", 4.0, (4.0, 0.0, 0.0)))
+
+
+@pytest.fixture(scope="module")
+def fleet(tmp_path_factory):
+    whole = plain_fleet("reference-drive").read_text(encoding="utf-8")
+    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
+    text = (whole[:start] + HOUSING + whole[end:]).replace("= 3000", "= 700")
+    path = tmp_path_factory.mktemp("fleet") / "fleet.toml"
+    path.write_text(text, encoding="utf-8")
+    speeds = {"operation.train_speed_km_h": SPEEDS, "operation.helix_angle_deg": (4.0,)}
+    changes = {"radiation.method": "boundary_elements", "model.gear_path": "structure"}
+    return td.load_fleet(path).replaced(speeds | changes)
+
+
+@pytest.fixture(scope="module")
+def housing(fleet):
+    return sound_of_made_up_modes(fleet, PLACES)
+
+
+def data_of(fleet, housing, values):
+    """Levels of the drive model, not of the level model, with other values."""
+    prediction = DriveModel(fleet.replaced(values), housing=housing).evaluate(receivers=PLACES[1:])
+    return [
+        MeasuredLevel(state.condition, place, sound.level_db(place.name), 0.3, "Z", "synthetic", "made")
+        for state, sound in zip(prediction.conditions, prediction.sound, strict=True)
+        for place in PLACES
+    ]
+
+
+def test_the_level_model_is_the_drive_model(fleet, housing):
+    values = {GAIN: 4.0, LOSS: 0.07, "gear_dynamics.mesh_damping_ratio": 0.09}
+    data = data_of(fleet, housing, values)
+    model = LevelModel(fleet, data, housing)
+    assert model.levels_db(values) == pytest.approx([datum.level_db for datum in data], abs=1e-5)
+    assert model.prepare([free_parameter(fleet, LOSS)]) < 0.05
+    assert model.levels_db(values) == pytest.approx([datum.level_db for datum in data], abs=0.15)
+
+
+def test_gain_and_loss_factor_come_back(fleet, housing):
+    truth = {GAIN: 5.0, LOSS: 0.08}
+    data = data_of(fleet, housing, truth)
+    free = [FreeParameter(GAIN, 0.0, -30.0, 30.0), free_parameter(fleet, LOSS)]
+    found = calibrate_fleet(fleet, data, free, FitSettings(model_sigma_db=0.5), housing=housing)
+    values = {parameter.key: parameter.value for parameter in found.parameters}
+    assert values[GAIN] == pytest.approx(5.0, abs=0.05)
+    assert values[LOSS] == pytest.approx(0.08, rel=0.02)
+    assert found.fleet.get(LOSS).value == pytest.approx(values[LOSS])
+    sounds = [sound.level_db("4 m", "structure") for sound in found.after]
+    assert np.isfinite(sounds).all()
+
+
+def test_the_structures_gain_is_the_level_added(fleet, housing):
+    data = data_of(fleet, housing, {})
+    model = LevelModel(fleet, data, housing)
+    assert model.levels_db({GAIN: 6.0}) - model.levels_db({}) == pytest.approx(np.full(len(data), 6.0), abs=1e-9)
+
+
+def test_a_path_that_the_total_leaves_out_is_not_computed(fleet, housing, monkeypatch):
+    from tdacoustic.drive import HousingField
+
+    masuda = fleet.replaced({"model.gear_path": "masuda"})
+    data = data_of(fleet, housing, {})
+    monkeypatch.setattr(HousingField, "structure_sources", lambda *_: pytest.fail("not asked for"))
+    assert np.isfinite(LevelModel(masuda, data, housing).levels_db({})).all()
+
+
+@pytest.mark.parametrize("key", ["housing.wall_mm", "radiation.temperature_degc", "housing.material.modulus_gpa"])
+def test_what_transfer_vectors_depend_on_cannot_be_free(fleet, housing, key):
+    data = data_of(fleet, housing, {})
+    value = float(fleet.get(key).value)
+    free = [FreeParameter(key, value, 0.5 * value, 2.0 * value)]
+    with pytest.raises(FittingError, match=f"{key} cannot be free: .* housing.loss_factor and model.structure_gain_db"):
+        calibrate_fleet(fleet, data, free, housing=housing)
+
+
+def test_masuda_alone_next_to_structure_is_said_to_count_twice(fleet, housing):
+    both = fleet.replaced({"model.gear_path": "sum"})
+    data = [replace(datum, level_db=datum.level_db + 20.0) for datum in data_of(fleet, housing, {})]
+    found = calibrate_fleet(both, data, [FreeParameter(GAIN, 0.0, -30.0, 60.0)], housing=housing)
+    assert any("counted twice" in doubt for doubt in found.doubts)
+    assert math.isfinite(found.parameters[0].value)
