@@ -45,7 +45,9 @@ StorePath = Annotated[
         "--store", help="Where intermediate results are kept.", show_default="$TDACOUSTIC_STORE or the user cache"
     ),
 ]
-Jobs = Annotated[int | None, typer.Option("--jobs", min=1, help="Processes.", show_default="one a core for large logs")]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", min=1, help="Processes.", show_default="one a core for large logs and housings")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone.")]
 
 
@@ -197,9 +199,10 @@ def predict(
     ] = None,
     overwrite: Overwrite = False,
     store: StorePath = None,
+    jobs: Jobs = None,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise."""
+    """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise, the housing and its sound."""
     from tdacoustic.fleet import load_fleet
     from tdacoustic.workflows.output import OutputFolder, default_output
     from tdacoustic.workflows.predict import predict as compute
@@ -209,7 +212,7 @@ def predict(
     target = out or default_output(loaded.path)
     folder = OutputFolder(target, loaded.path, overwrite)
     with _progress(quiet) as progress:
-        result = compute(loaded, store, progress)
+        result = compute(loaded, store, progress, jobs=jobs)
     write_prediction(result, folder)
     _warn(result.prediction.doubts, quiet)
     if not quiet:

@@ -69,6 +69,8 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
         )
     if placement == "off":
         yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
+    if fleet.radiation.air_absorption.value:
+        yield "air_absorption is asked for and is not computed: levels are those of air that absorbs nothing"
     if unknown:
         yield (
             f"excitation{'s' if len(unknown) > 1 else ''} {', '.join(unknown)} of the motor: neither flux "

@@ -136,8 +136,9 @@ class DriveModel:
         """
         structure = self.field.structure_sources(forces)
         sources = (*self.motor_sources(condition), *self.gear_sources(condition, masuda_db), *structure)
-        levels = self.field.levels(sources, (self.field.surface, *receivers))
-        return DriveSound(condition.name, sources, levels)
+        surface = self.field.surface
+        levels = self.field.levels(sources, (surface, *receivers))
+        return DriveSound(condition.name, sources, levels, tuple(self.field.received_db(sources, surface).tolist()))
 
     def motor_sources(self, condition: Condition) -> tuple[SoundSource, ...]:
         """Return the motor's tones in a condition."""

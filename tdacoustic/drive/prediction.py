@@ -48,14 +48,17 @@ class DriveSound:
     ----------
     condition : str
     sources : tuple of SoundSource
-        Tones of the motor, and the meshing noise.
+        Tones of the motor, the meshing noise, and the housing's tones where it is computed.
     levels : tuple of LevelAt
         Of each path and of the total, on the surface of ``[radiation] sphere_radius_m`` and at each receiver.
+    surface_db : tuple of float
+        Level of each source on that surface.
     """
 
     condition: str
     sources: tuple[SoundSource, ...]
     levels: tuple[LevelAt, ...]
+    surface_db: tuple[float, ...] = ()
 
     def level_db(self, receiver: str, path: str = "total", weighting: str = "Z") -> float | None:
         """Return one of the levels; None of a path without sound."""
@@ -64,10 +67,9 @@ class DriveSound:
                 return level.level_db
         return None
 
-    @property
-    def motor_sound_power_level_db(self) -> float | None:
-        """Of all tones of the motor together, re 1 pW; None of a silent one."""
-        return overall_level_db([s.sound_power_level_db for s in self.sources if s.path == "motor"])
+    def sound_power_level_db(self, path: str) -> float | None:
+        """Return that of all tones of a path together, re 1 pW; None of a silent one."""
+        return overall_level_db([s.sound_power_level_db for s in self.sources if s.path == path])
 
 
 @dataclass(frozen=True)

@@ -5,10 +5,12 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Section
 from tdacoustic.reporting.sections.bearing_loads import bearing_loads
+from tdacoustic.reporting.sections.directivity import directivity
 from tdacoustic.reporting.sections.gear_answer import gear_answer
 from tdacoustic.reporting.sections.gear_method import gear_method
 from tdacoustic.reporting.sections.gear_pair import gear_pair
 from tdacoustic.reporting.sections.helix_sweep import helix_sweep
+from tdacoustic.reporting.sections.housing import housing_section
 from tdacoustic.reporting.sections.mesh_stiffness import mesh_stiffness
 from tdacoustic.reporting.sections.meshing_noise import meshing_noise
 from tdacoustic.reporting.sections.model_parameters import model_parameters
@@ -64,7 +66,9 @@ def predicted_sections(result: FleetPrediction) -> list[Section]:
         bearing_loads,
         speed_sweep,
         meshing_noise,
+        housing_section,
         sound_field,
+        directivity,
         helix_sweep,
         model_parameters,
     ]

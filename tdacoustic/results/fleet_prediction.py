@@ -27,7 +27,7 @@ class FleetPrediction:
     fleet : Fleet
     prediction : Prediction
     tables : mapping of str to DataFrame
-        ``conditions``, ``predictions``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``.
+        ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``.
     inputs : tuple of LogInput
         The fleet file.
     records : tuple of (str, Record)

@@ -24,8 +24,8 @@ HARMONICS_AT_LEAST = 10
 def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.DataFrame]:
     """Return the tables of a prediction as frames, by name.
 
-    ``conditions``, ``predictions``, ``directivity``, ``bearing_forces``, ``helix`` and ``speed_sweep``; the last is
-    left out where it was not computed. Columns of parts that the model does not have are empty.
+    ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix`` and ``speed_sweep``;
+    the last is left out where it was not computed. Columns of parts that the model does not have are empty.
 
     Parameters
     ----------
@@ -39,6 +39,7 @@ def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.
             for state, sound in zip(prediction.conditions, prediction.sound, strict=True)
         ),
         "predictions": (row for sound in prediction.sound for row in _level_rows(sound)),
+        "sound_lines": (row for sound in prediction.sound for row in _line_rows(sound)),
         "directivity": (row for around in prediction.directivity for row in _around_rows(around)),
         "bearing_forces": (row for state in prediction.conditions for row in _force_rows(state, highest_hz)),
     }
@@ -71,7 +72,8 @@ def _condition_row(state: GearState, sound: DriveSound, surface: str) -> Row:
         "mesh_frequency_hz": state.mesh_hz,
         "torque_n_m": condition.torque_n_m,
         "masuda_spl_1m_db": state.masuda_db,
-        "motor_sound_power_level_db": sound.motor_sound_power_level_db,
+        "motor_sound_power_level_db": sound.sound_power_level_db("motor"),
+        "structure_sound_power_level_db": sound.sound_power_level_db("structure"),
         **{f"{path}_spl_4m_db": sound.level_db(surface, path) for path in ("structure", "mesh", "motor")},
         "spl_4m_db": sound.level_db(surface),
         "mode": condition.mode,
@@ -91,6 +93,18 @@ def _level_rows(sound: DriveSound) -> Iterator[Row]:
             "path": level.path,
             "weighting": level.weighting,
             "level_db": level.level_db,
+        }
+
+
+def _line_rows(sound: DriveSound) -> Iterator[Row]:
+    for source, level in zip(sound.sources, sound.surface_db, strict=True):
+        yield {
+            "condition": sound.condition,
+            "path": source.path,
+            "source": source.name,
+            "frequency_hz": source.frequency_hz,
+            "sound_power_level_db": source.sound_power_level_db,
+            "level_4m_db": level,
         }
 
 

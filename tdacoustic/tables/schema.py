@@ -21,8 +21,10 @@ COLUMNS: Final = MappingProxyType(
         "observed_mesh_frequency_hz observed_mesh_error_hz mesh_excess causes",
         "conditions": "condition train_speed_km_h motor_speed_rpm mesh_frequency_hz torque_n_m dte_pp_um floquet_max "
         "masuda_spl_1m_db motor_sound_power_level_db structure_spl_4m_db mesh_spl_4m_db motor_spl_4m_db spl_4m_db "
-        "mode power_kw method periodic repeats_after_mesh_periods contact_part static_compression_um",
+        "mode power_kw method periodic repeats_after_mesh_periods contact_part static_compression_um "
+        "structure_sound_power_level_db",
         "predictions": "condition receiver path weighting level_db",
+        "sound_lines": "condition path source frequency_hz sound_power_level_db level_4m_db",
         "directivity": "sweep value angle_deg spl_12m_db",
         "bearing_forces": "condition gear direction harmonic frequency_hz force_amplitude_n phase_deg",
         "helix": "helix_angle_deg centre_distance_mm dte_pp_um masuda_spl_1m_db spl_4m_db condition mesh_frequency_hz "

@@ -76,7 +76,7 @@ def run(
         return CampaignResult(campaign, analysis, None, None, (NO_FLEET,))
     calibration, unfitted = _tried(lambda: calibrate(campaign, store, jobs, progress, analysis=analysis))
     used = fleet if calibration is None else calibration.calibration.fleet
-    prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, progress))
+    prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, jobs, progress))
     if prediction is None and lost is not None:
         raise lost
     not_done = _not_done(campaign, fleet, unfitted, unpredicted)
@@ -106,7 +106,12 @@ def _tried(task: Callable[[], T]) -> tuple[T | None, TdacousticError | None]:
 
 
 def _predicted(
-    campaign: Campaign, analysis: Analysis, fleet: Fleet, store: Store, progress: Progress | None
+    campaign: Campaign,
+    analysis: Analysis,
+    fleet: Fleet,
+    store: Store,
+    jobs: int | None,
+    progress: Progress | None,
 ) -> FleetPrediction:
     from tdacoustic.workflows.measured_levels import campaign_conditions
     from tdacoustic.workflows.microphones import microphone_doubts, microphones
@@ -115,7 +120,7 @@ def _predicted(
     conditions, doubts = campaign_conditions(campaign, analysis, fleet)
     conditions = {**conditions, **_more_conditions(fleet, conditions)}
     receivers = tuple(microphones(campaign, fleet).values())
-    found = predict(fleet, store, progress, conditions.values(), receivers)
+    found = predict(fleet, store, progress, conditions.values(), receivers, jobs)
     doubts = [*doubts, *microphone_doubts(campaign), *found.prediction.doubts]
     return replace(found, prediction=replace(found.prediction, doubts=tuple(dict.fromkeys(doubts))))
 

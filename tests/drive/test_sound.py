@@ -68,7 +68,7 @@ def test_levels_at_4_m_are_powers_less_23_decibels(fleet_of):
         mesh, motor = sound.level_db("4 m", "mesh"), sound.level_db("4 m", "motor")
         # Masuda's level is that at 1 m of a point source: at 4 m 12.04 dB less
         assert mesh == pytest.approx(state.masuda_db - 20.0 * math.log10(4.0), abs=1e-9)
-        assert motor == pytest.approx(sound.motor_sound_power_level_db - 23.0333, abs=1e-3)
+        assert motor == pytest.approx(sound.sound_power_level_db("motor") - 23.0333, abs=1e-3)
         total = 10.0 * math.log10(10.0 ** (mesh / 10.0) + 10.0 ** (motor / 10.0))
         assert sound.level_db("4 m") == pytest.approx(total, abs=1e-9)
         assert sound.level_db("4 m", "structure") is None

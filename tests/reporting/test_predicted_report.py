@@ -2,10 +2,10 @@
 
 import dataclasses
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
+from plain_fleets import plain_fleet
 
 from tdacoustic.drive import DriveModel, GearState, SpeedSweep
 from tdacoustic.fleet import load_fleet
@@ -22,7 +22,7 @@ from tdacoustic.results import FleetPrediction, LogInput
 from tdacoustic.steps import Store
 from tdacoustic.workflows.predict import predict
 
-REFERENCE = load_fleet(Path(__file__).resolve().parents[2] / "calibration" / "reference-drive")
+REFERENCE = load_fleet(plain_fleet("reference-drive"))
 RATTLING = {"operation.torque_n_m": 300.0, "gear_pair.1.transmission_error_um": (8.0,)}
 
 INPUTS = (LogInput("fleet.toml", "0" * 64, 0, "TOML"),)

@@ -40,9 +40,11 @@ SAME = 1e-3
 
 METHOD = (
     "A force is what the shaft exerts on its bearings through their springs and dampers, K x + C x'. It is the total "
-    "of all bearings of a gear: how it is split between the two bearings of a shaft is not modelled. x lies along the "
-    "line of centres, y is tangential, z lies along the shafts. Amplitudes are peak values of a line."
+    "of all bearings of a gear{split}. x lies along the line of centres, y is tangential, z lies along the shafts. "
+    "Amplitudes are peak values of a line."
 )
+NOT_SPLIT = ": how it is split between the two bearings of a shaft is not modelled"
+SPLIT = "; only for the housing is it split between the two bearings of a shaft"
 NOTHING_BETWEEN = (
     "The motion repeats with each mesh period, so it has nothing between the mesh harmonics: at the sampling points "
     "there the force is zero, which a logarithmic axis cannot show; crosses at its lower edge mark them. What the "
@@ -59,7 +61,8 @@ def bearing_loads(result: FleetPrediction) -> Section:
     """Return the section on bearing forces."""
     states = by_speed(result.prediction.conditions)
     loaded = [state for state in states if largest_line(state) is not None]
-    blocks: list[Block] = [Paragraph(METHOD)]
+    split = NOT_SPLIT if result.prediction.housing is None else SPLIT
+    blocks: list[Block] = [Paragraph(METHOD.format(split=split))]
     still = [state for state in states if state not in loaded]
     if still:
         without = "without torque the teeth of the model do not touch, and there is no force"

@@ -10,13 +10,15 @@ import numpy as np
 
 from tdacoustic.drive import DriveSound
 from tdacoustic.fitting.calibration import FittedLevel
-from tdacoustic.reporting.figure import Axis, Band, Figure, Line, Markers, Symbol
+from tdacoustic.reporting.figure import Axis, Band, Figure, Line, LineStyle, Markers, Symbol
 from tdacoustic.reporting.sections.printed import (
     LARGEST_ERROR_DB,
     MEASURED_4M,
     MODEL_4M,
     is_of_the_paper,
 )
+from tdacoustic.reporting.sections.sound_paths import heard_paths, total_words
+from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import CampaignCalibration
 
 __all__ = ["contributions_figure", "levels_figure", "residuals_figure"]
@@ -130,27 +132,31 @@ def _of_paper(result: CampaignCalibration) -> list[Markers]:
 
 
 def contributions_figure(result: CampaignCalibration) -> Figure | None:
-    """Return the levels of motor and meshing noise over speed, before and after; None where there are none."""
+    """Return the level of each path over speed, before and after; None where there are none."""
     held = _surface_levels(result)
     if not held:
         return None
     receiver = held[0].datum.receiver.name
     speeds = {level.datum.condition.name: level.datum.condition.train_speed_km_h for level in held}
     elements: list[Line] = []
-    for color, path, name in ((0, "motor", "motor"), (1, "mesh", "meshing noise")):
-        for sounds, words, style in (
-            (result.calibration.before, "before", "dotted"),
-            (result.calibration.after, "after", "solid"),
-        ):
-            x, y = _over_speed(sounds, speeds, receiver, path)
+    sides: tuple[tuple[Iterable[DriveSound], str, LineStyle], ...] = (
+        (result.calibration.before, "before", "dotted"),
+        (result.calibration.after, "after", "solid"),
+    )
+    drawn = []
+    for path in heard_paths((*result.calibration.before, *result.calibration.after)):
+        for sounds, words, style in sides:
+            x, y = _over_speed(sounds, speeds, receiver, path.key)
             if y.size and not np.isnan(y).all():
-                elements.append(Line(x, y, f"{name}, {words}", style=style, color=color, points=True))  # type: ignore[arg-type]
+                elements.append(Line(x, y, f"{path.name}, {words}", style=style, color=path.slot, points=True))
+                drawn.append(path)
     if not elements:
         return None
     return Figure(
         "calibration-contributions",
-        f"What motor and meshing noise contribute at {receiver}, before and after the calibration",
-        "Unweighted levels of each path alone; the total adds their energies.",
+        f"What {joined([path.name for path in dict.fromkeys(drawn)])} contribute at {receiver}, before and after the "
+        "calibration",
+        f"Unweighted levels of each path alone. {total_words(result.fleet, dict.fromkeys(drawn))}",
         Axis("Train speed", "km/h"),
         Axis("Sound pressure level", "dB", reference="20 µPa"),
         elements,

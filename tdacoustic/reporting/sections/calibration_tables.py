@@ -6,6 +6,7 @@ from typing import Final
 
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.sections.sound_paths import heard_paths
 from tdacoustic.results import CampaignCalibration
 
 __all__ = [
@@ -99,22 +100,23 @@ def sources_table(result: CampaignCalibration) -> Table:
 
 
 def contributions_table(found: Calibration) -> Table:
-    """Return the level of each path at each receiver, before and after."""
+    """Return the level of each path at each receiver, before and after; of the structure where it has one."""
+    heard = [path.key for path in heard_paths((*found.before, *found.after))]
+    titles = {"motor": "Motor", "mesh": "Meshing", "structure": "Structure", "total": "Total"}
+    titles = {path: title for path, title in titles.items() if path != "structure" or path in heard}
     columns = (
         Column("condition", "Condition"),
         Column("receiver", "At"),
         *(
             Column(f"{path}_{side}_db", f"{title} {side}", "dB", 1, "number")
-            for path, title in (("motor", "Motor"), ("mesh", "Meshing"), ("total", "Total"))
+            for path, title in titles.items()
             for side in ("before", "after")
         ),
     )
     rows: list[list[Cell]] = []
     for before, after in zip(found.before, found.after, strict=True):
         for receiver in dict.fromkeys(level.receiver for level in before.levels):
-            levels = [
-                sound.level_db(receiver, path) for path in ("motor", "mesh", "total") for sound in (before, after)
-            ]
+            levels = [sound.level_db(receiver, path) for path in titles for sound in (before, after)]
             rows.append([before.condition, receiver, *levels])
     return Table("calibration-contributions-table", "Contributions", columns, rows, origin="calculated")
 

@@ -39,7 +39,11 @@ SCOPE = (
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
     "them, and the level around these as point sources; the housing is not."
 )
-
+SCOPE_WITH_HOUSING = (
+    "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
+    "them, and the housing: what the bearing forces make it radiate, and how it scatters the sources beside it. The "
+    "bearing forces are those of bearings in a housing that does not move."
+)
 
 TERMS = (
     "DTE is the dynamic transmission error. Forces are the total of a gear's bearings, peak amplitudes of a line; x "
@@ -61,7 +65,7 @@ def gear_overview(result: FleetPrediction) -> Section:
 def _said(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
     blocks: list[Block] = [
-        Paragraph(f"{regime_words(result)} {SCOPE}"),
+        Paragraph(f"{regime_words(result)} {SCOPE if result.prediction.housing is None else SCOPE_WITH_HOUSING}"),
         Sentences([_of_condition(result.fleet, state, sound_words(result, state)) for state in states]),
     ]
     if any(state.masuda_db is not None for state in states):

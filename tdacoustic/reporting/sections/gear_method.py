@@ -58,6 +58,12 @@ def _small(value: float) -> str:
     return f"{value:g}".replace("e-0", "e-").replace("-", "\N{MINUS SIGN}")
 
 
+def _split_words(result: FleetPrediction) -> str:
+    if result.prediction.housing is None:
+        return "nothing is split between the two bearings of a shaft"
+    return "their forces are split between the two bearings of a shaft for the housing alone, by the lever rule"
+
+
 def _harmonics_words(states: list[SteadyState]) -> str:
     found = sorted({s.lines.harmonic.size for s in states if s.method == "harmonic_balance"})
     if not found:
@@ -83,7 +89,7 @@ def _assumptions(result: FleetPrediction) -> list[str]:
         "The working transverse pressure angle stands for the pressure angle in the direction of the mesh force.",
         f"The transmission error of the unloaded gears is {waves}, {where} {error} µm, phase 0, at any speed and load.",
         f"The backlash is {2e6 * unit.system.half_backlash_m:g} µm, the same at every tooth.",
-        "Springs and dampers are the total of a gear's bearings; nothing is split between the two bearings of a shaft.",
+        f"Springs and dampers are the total of a gear's bearings; {_split_words(result)}.",
         damping,
         "Gears are of steel, with solid discs; the mean stiffness of the mesh does not change with the load.",
         "No friction between the teeth, no bending or torsion of the shafts, no tilt of the gears, no tip relief or "

@@ -10,6 +10,7 @@ from tdacoustic.drive import HelixCase
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
 from tdacoustic.reporting.sections.gear_words import level_unit, micrometres, motion_cells
+from tdacoustic.reporting.sections.sound_paths import heard_paths, path_line
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["helix_sweep", "helix_words"]
@@ -21,7 +22,7 @@ def helix_sweep(result: FleetPrediction) -> Section | None:
     if result.fleet.operation.helix_angle_deg is None or not cases:
         return None
     angles = np.array([case.helix_angle_deg for case in cases])
-    blocks: list[Block] = [Paragraph(_method(cases[0])), _table(result, cases)]
+    blocks: list[Block] = [Paragraph(_method(result, cases[0])), _table(result, cases)]
     if len(cases) > 1:
         dte = np.array([1e6 * case.gears.steady.dte_pp_m for case in cases])
         levels = np.array([math.nan if case.gears.masuda_db is None else case.gears.masuda_db for case in cases])
@@ -33,6 +34,8 @@ def helix_sweep(result: FleetPrediction) -> Section | None:
         if np.isfinite(levels).any():
             axis = Axis("Level at 1 m", unit, reference="20 µPa")
             blocks.append(_figure("helix-masuda", "Masuda's level over the helix angle", axis, angles, levels))
+        around = _level_figure(result, cases, angles)
+        blocks += [] if around is None else [FigureBlock(around, "calculated")]
         axis = Axis("Centre distance", "mm")
         blocks.append(_figure("helix-distance", "Centre distance over the helix angle", axis, angles, distances))
     return Section("helix-sweep", "Helix sweep", blocks)
@@ -53,27 +56,33 @@ def helix_words(result: FleetPrediction) -> str:
     )
 
 
-def _method(case: HelixCase) -> str:
+def _method(result: FleetPrediction, case: HelixCase) -> str:
     condition = case.gears.condition
+    stays = "" if result.prediction.housing is None else "the housing and its seats, "
     return (
         f"At {condition.train_speed_km_h:.4g} km/h, the fastest condition. Rack, teeth, profile shifts and face width "
         "stay; the centre distance, the contact ratios, the stiffness of the mesh and the working pressure angle "
-        "follow from the helix angle. Masses, inertias, bearings and the unloaded transmission error stay as they "
-        "are: that a longer contact line averages a real one more is left out."
+        f"follow from the helix angle. Masses, inertias, bearings, {stays}and the unloaded transmission error stay as "
+        "they are: that a longer contact line averages a real one more is left out."
     )
 
 
 def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
-    columns = (
+    surface = result.prediction.surface
+    with_structure = result.prediction.housing is not None
+    columns = [
         Column("helix_angle_deg", "Helix angle", "°", 1, "number"),
-        Column("centre_distance_mm", "Distance", "centres, mm", 3, "number"),
-        Column("transverse_contact_ratio", "Transverse", "contact ratio", 3, "number"),
-        Column("overlap_ratio", "Overlap", "ratio", 3, "number"),
+        Column("centre_distance_mm", "Centres", "mm", 3, "number"),
+        Column("transverse_contact_ratio", "εα", "", 3, "number"),
+        Column("overlap_ratio", "εβ", "", 3, "number"),
         Column("stiffness_n_per_um", "k̄", "N/µm", 0, "number"),
-        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
-        Column("masuda_spl_1m_db", "Level at 1 m", level_unit(result.fleet), 1, "number"),
+        Column("dte_pp_um", "DTE p-p", "µm", 2, "number"),
+        Column("masuda_spl_1m_db", "Masuda", f"{level_unit(result.fleet)}, 1 m", 1, "number"),
+        Column("spl_db", "Total", f"dB, {surface}", 1, "number"),
         Column("motion", "Motion"),
-    )
+    ]
+    if with_structure:
+        columns.insert(7, Column("structure_spl_db", "Structure", f"dB, {surface}", 1, "number"))
     rows: list[list[Cell]] = [
         [
             case.helix_angle_deg,
@@ -83,11 +92,37 @@ def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
             1e-6 * case.unit.stiffness.normal_n_per_m,
             1e6 * case.gears.steady.dte_pp_m,
             case.gears.masuda_db,
+            *([case.sound.level_db(surface, "structure")] if with_structure else []),
+            case.sound.level_db(surface),
             motion_cells(case.gears.steady)[0],
         ]
         for case in cases
     ]
-    return Table("helix", "Helix sweep", columns, rows, origin="calculated")
+    caption = "Helix sweep: εα is the transverse contact ratio, εβ the overlap ratio, k̄ the mean stiffness of the mesh"
+    return Table("helix", caption, columns, rows, origin="calculated")
+
+
+def _level_figure(result: FleetPrediction, cases: list[HelixCase], angles: np.ndarray) -> Figure | None:
+    """The level on the surface, the total and each path; None where the meshing noise alone makes it, as at 1 m."""
+    held = heard_paths(case.sound for case in cases)
+    if [path.key for path in held] in ([], ["mesh"]):
+        return None
+    surface = result.prediction.surface
+    of = {"total": [case.sound.level_db(surface) for case in cases]}
+    of |= {path.key: [case.sound.level_db(surface, path.key) for case in cases] for path in held}
+    levels = {key: np.array([math.nan if level is None else level for level in row]) for key, row in of.items()}
+    lines = [path_line(result.fleet, path, angles, levels[path.key]) for path in held]
+    if np.isfinite(levels["total"]).any():
+        lines.insert(0, Line(angles, levels["total"], "total", color=7, points=True))
+    return Figure(
+        "helix-level",
+        f"Level at {surface} over the helix angle",
+        "Mean in energy over the surface. One dot a computed angle; the lines between them only lead the eye.",
+        Axis("Helix angle", "°"),
+        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        lines,
+        height=360,
+    )
 
 
 def _figure(name: str, title: str, axis: Axis, angles: np.ndarray, values: np.ndarray) -> FigureBlock:

@@ -1,4 +1,4 @@
-"""What the gear model rests on: every parameter that it used, assumed ones tagged."""
+"""What the model rests on: every parameter of gears, housing and sound field that it used, assumed ones tagged."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import Final
 
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Block, Notice, Section
+from tdacoustic.reporting.sections.housing_parameters import housing_named
 from tdacoustic.reporting.sections.meshing_noise import PARAMETERS as MASUDA
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import joined
@@ -49,14 +50,14 @@ _OF_LAW: Final = {
 }
 _OTHERS: Final = {
     "train.wheel_diameter_mm": ("Wheel diameter", "mm"),
-    "radiation.max_frequency_hz": ("Frequency up to which forces are listed", "Hz"),
 }
 
 
 def model_parameters(result: FleetPrediction) -> Section:
     """Return the section on what the model rests on."""
     fleet = result.fleet
-    caption = f"Parameters that the gear model used, from the fleet file of {fleet.name}"
+    parts = "gears and sound field" if result.prediction.housing is None else "gears, housing and sound field"
+    caption = f"Parameters that the model of {parts} used, from the fleet file of {fleet.name}"
     table = parameter_table("model-parameters", caption, fleet, lambda key: named(fleet, key))
     standing = [row[2] for row in table.rows]
     assumed = standing.count("assumed")
@@ -68,7 +69,7 @@ def model_parameters(result: FleetPrediction) -> Section:
 
 
 def named(fleet: Fleet, key: str) -> tuple[str, str] | None:
-    """Return words and unit of a parameter that the gear model uses, None of another."""
+    """Return words and unit of a parameter that the model of gears, housing and sound field uses, None of another."""
     if key in _OTHERS or key in MASUDA:
         return {**_OTHERS, **MASUDA}[key]
     section, _, last = key.rpartition(".")
@@ -81,7 +82,7 @@ def named(fleet: Fleet, key: str) -> tuple[str, str] | None:
         return _PAIR.get(last)
     if section.startswith("gear_pair.") and last == "teeth":
         return f"Teeth of gear pair {fleet.gear_pair[int(section.split('.')[1]) - 1].name}, for its ratio", ""
-    return None
+    return housing_named(fleet, key)
 
 
 def assumed_words(fleet: Fleet) -> str:

@@ -17,6 +17,7 @@ from tdacoustic.reporting.sections.gear_words import (
     sentence,
     state_words,
 )
+from tdacoustic.reporting.sections.sound_paths import SoundPath, heard_paths, is_added
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import CampaignResult, FleetPrediction
 
@@ -120,15 +121,17 @@ def _level_words(found: FleetPrediction) -> str:
 
 
 def _louder_words(found: FleetPrediction) -> str:
-    """Which of motor and meshing noise is the louder one, by condition; one that is not there is silent."""
-    held: dict[str, list[GearState]] = {"motor": [], "mesh": []}
+    """Which of the paths of the total is the loudest, by condition; empty of fewer than two paths."""
+    added = [path for path in heard_paths(found.prediction.sound) if is_added(found.fleet, path)]
+    if len(added) < 2:
+        return ""
+    held: dict[SoundPath, list[GearState]] = {path: [] for path in added}
     for state in by_speed(found.prediction.conditions):
-        levels = {path: level for path in held if (level := _total_db(found, state, path)) is not None}
+        levels = {path: level for path in added if (level := _total_db(found, state, path.key)) is not None}
         if levels:
             held[max(levels, key=levels.__getitem__)].append(state)
-    names = {"motor": "the motor's tones", "mesh": "the meshing noise"}
-    parts = [f"{names[path]} in {conditions_words(states)}" for path, states in held.items() if states]
-    return sentence(f"the louder part is {', '.join(parts)}") if parts else ""
+    parts = [f"{path.phrase} in {conditions_words(states)}" for path, states in held.items() if states]
+    return sentence(f"the {'louder' if len(added) == 2 else 'loudest'} part of the total is {', '.join(parts)}")
 
 
 def _new_doubts(result: CampaignResult) -> list[Notice]:

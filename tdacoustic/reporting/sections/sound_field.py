@@ -3,68 +3,151 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
-from tdacoustic.drive import DriveSound, GearState
+from tdacoustic.drive import DriveSound, GearState, HousingFacts
 from tdacoustic.fleet import Fleet
-from tdacoustic.reporting.document import Block, Cell, Column, Details, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.sections.gear_words import conditions_words, sentence
+from tdacoustic.reporting.sections.sound_paths import PATHS, heard_paths, is_added, path_line, total_words
+from tdacoustic.reporting.sections.sound_spectra import sound_spectra
+from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["sound_field", "sound_words"]
 
-_PATHS = (("mesh", "Meshing noise", 1), ("motor", "Motor", 0))
+OF_MOTOR = "The motor's tones come from the fleet's excitations."
+OF_MESH = "The meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency"
+
+OF_POWERS = (
+    "The sound power level of a tone of the motor is that without the housing beside it; that of a tone of the "
+    "structure is that of a point source with the same mean level at {surface}."
+)
 
 
 def sound_field(result: FleetPrediction) -> Section:
     """Return the section on the levels around the drive."""
     prediction, fleet = result.prediction, result.fleet
-    blocks: list[Block] = [Paragraph(_method(fleet)), _table(result)]
-    levels = {path: _levels(result, path) for path in ("total", "mesh", "motor")}
-    if np.isfinite(levels["total"]).any():
+    blocks = _method(result)
+    held = heard_paths(prediction.sound)
+    if held:
+        blocks.append(Paragraph(" ".join(part for part in (total_words(fleet, held), _silent_words(result)) if part)))
+    blocks.append(_table(result))
+    levels = {path: _levels(result, path) for path in ("total", *(path.key for path in PATHS))}
+    if held:
         blocks.append(FigureBlock(_figure(result, levels), "calculated"))
+    spectra = sound_spectra(result)
+    blocks += [] if spectra is None else [spectra]
     tones = [
-        (sound.condition, s.path, s.name, s.frequency_hz, s.sound_power_level_db)
+        (sound.condition, s.path, s.name, s.frequency_hz, s.sound_power_level_db, level)
         for sound in prediction.sound
-        for s in sound.sources
+        for s, level in zip(sound.sources, sound.surface_db, strict=True)
     ]
     if tones:
-        columns = (
-            Column("condition", "Condition"),
-            Column("path", "Path"),
-            Column("name", "Source"),
-            Column("frequency_hz", "Frequency", "Hz", 1, "number"),
-            Column("sound_power_level_db", "Sound power level", "dB re 1 pW", 1, "number"),
-        )
-        table = Table("sound-sources", "Sources", columns, tones, origin="calculated")
-        blocks.append(Details(f"{len(tones)} sources", [table]))
+        folded: list[Block] = [_sources(tones, prediction.surface)]
+        if prediction.housing is not None:
+            folded.insert(0, Paragraph(OF_POWERS.format(surface=prediction.surface)))
+        blocks.append(Details(f"{len(tones)} sources", folded))
     return Section("sound-field", "Sound around the drive", blocks)
 
 
 def sound_words(result: FleetPrediction, state: GearState) -> str:
     """Return the level on the surface and what it is made of, in words; empty without sound."""
     sound, surface = result.prediction.sound_of(state.condition.name), result.prediction.surface
-    total = None if sound is None else sound.level_db(surface)
-    if sound is None or total is None:
+    if sound is None:
         return ""
-    parts = [
-        f"{name} {level:.1f} dB"
-        for path, name in (("motor", "motor"), ("mesh", "mesh"))
-        if (level := sound.level_db(surface, path)) is not None
-    ]
-    return f"level at {surface} {total:.1f} dB ({', '.join(parts)})"
+    levels = {path: level for path in PATHS if (level := sound.level_db(surface, path.key)) is not None}
+    added, beside = (
+        [f"{path.key} {level:.1f} dB" for path, level in levels.items() if is_added(result.fleet, path) is wanted]
+        for wanted in (True, False)
+    )
+    parts = [", ".join(added)] if added else []
+    parts += [f"not added: {', '.join(beside)}"] if beside else []
+    if not parts:
+        return ""
+    total = sound.level_db(surface)
+    start = f"no level at {surface}" if total is None else f"level at {surface} {total:.1f} dB"
+    return f"{start} ({'; '.join(parts)})"
 
 
-def _method(fleet: Fleet) -> str:
+def _method(result: FleetPrediction) -> list[Block]:
+    """What the paths are, and what the level is: a paragraph of point sources, a list with a housing."""
+    where, mean = _space(result.fleet)
+    housing = result.prediction.housing
+    if housing is None:
+        text = (
+            f"The sources are points in {where}; {mean}. {OF_MOTOR} {OF_MESH}; the housing is already in it. The "
+            "bearing forces' way through the housing is not computed. Levels of both sources stand here whether the "
+            "total adds them or not."
+        )
+        return [Paragraph(text)]
+    low, high = housing.range_hz
+    start = (
+        f"In {where} stands the housing, a closed box, computed from {low:.0f} to {high:.0f} Hz; {mean}. Levels of "
+        "every path stand here whether the total adds them or not."
+    )
+    beyond = (
+        f"Outside of {low:.0f} to {high:.0f} Hz point sources radiate as if there were no housing, and bearing forces "
+        "give no sound."
+    )
+    return [Paragraph(start), Sentences([*_path_words(result.fleet, housing), beyond])]
+
+
+def _path_words(fleet: Fleet, housing: HousingFacts) -> list[str]:
+    gain_db = fleet.model.structure_gain_db.value
+    gain = f", with [model] structure_gain_db = {pretty_signs(f'{gain_db:+g}')} dB" if gain_db else ""
+    structure = (
+        "Structure: the lines of the bearing forces shake the housing at its seats; its modes (finite elements) answer "
+        f"and boundary elements give their sound{gain}."
+    )
+    motor = (
+        f"Motor: {OF_MOTOR[:1].lower()}{OF_MOTOR[1:-1]}, as point sources beside the rigid housing, which scatters "
+        "them. Their volume flow is held, so that the housing changes their power."
+    )
+    mesh = (
+        f"Mesh: {OF_MESH[:1].lower()}{OF_MESH[1:]}, outside of the housing. That level is of a gear unit with its "
+        "housing, so the power of the source is held: the rigid housing gives it a direction and nothing else."
+    )
+    return [structure, *([] if housing.motor_m is None else [motor]), mesh]
+
+
+def _space(fleet: Fleet) -> tuple[str, str]:
     free = fleet.radiation.space.value == "free"
     where = "free space" if free else "the space over rigid ground at the rail"
-    return (
-        f"The sources are points in {where}; the level is the mean in energy over the "
-        f"{'sphere' if free else 'half sphere'}. The motor's tones come from the fleet's excitations. The meshing "
-        "noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency; the housing is already in "
-        "it. The bearing forces' way through the housing is not computed. Levels of both sources stand here whether "
-        "the total adds them or not."
+    return where, f"the level is the mean in energy over the {'sphere' if free else 'half sphere'}"
+
+
+def _silent_words(result: FleetPrediction) -> str:
+    """Conditions whose bearing forces all lie where the housing is not computed; empty of none."""
+    housing = result.prediction.housing
+    if housing is None:
+        return ""
+    silent = [
+        state
+        for state, sound in _conditions(result)
+        if sound is not None
+        and len(state.forces.frequency_hz)
+        and all(source.path != "structure" for source in sound.sources)
+    ]
+    if not silent:
+        return ""
+    low, high = housing.range_hz
+    return sentence(
+        f"{conditions_words(silent)}: no line of the bearing forces lies within {low:.0f} to {high:.0f} Hz, so the "
+        "structure has no level there"
     )
 
 
@@ -81,40 +164,52 @@ def _conditions(result: FleetPrediction) -> list[tuple[GearState, DriveSound | N
 
 def _table(result: FleetPrediction) -> Table:
     surface = result.prediction.surface
-    columns = (
+    with_structure = result.prediction.housing is not None
+    columns = [
         Column("condition", "Condition"),
         Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("motor_power_db", "Motor", "sound power, dB re 1 pW", 1, "number"),
-        Column("motor_spl_db", f"Motor at {surface}", "dB", 1, "number"),
-        Column("mesh_spl_db", f"Mesh at {surface}", "dB", 1, "number"),
-        Column("spl_db", f"Total at {surface}", "dB", 1, "number"),
-        Column("a_weighted_db", f"Total at {surface}", "dB(A)", 1, "number"),
-    )
-    rows: list[list[Cell]] = [
-        [
-            state.condition.name,
-            state.condition.train_speed_km_h,
-            sound.motor_sound_power_level_db,
-            sound.level_db(surface, "motor"),
-            sound.level_db(surface, "mesh"),
-            sound.level_db(surface),
-            sound.level_db(surface, weighting="A"),
-        ]
-        for state, sound in _conditions(result)
-        if sound is not None
+        Column("motor_power_db", "Motor's power", "dB re 1 pW", 1, "number"),
+        Column("motor_spl_db", "Motor", f"dB, {surface}", 1, "number"),
+        Column("mesh_spl_db", "Mesh", f"dB, {surface}", 1, "number"),
+        Column("spl_db", "Total", f"dB, {surface}", 1, "number"),
+        Column("a_weighted_db", "Total", f"dB(A), {surface}", 1, "number"),
     ]
+    if with_structure:
+        columns.insert(5, Column("structure_spl_db", "Structure", f"dB, {surface}", 1, "number"))
+    rows: list[list[Cell]] = []
+    for state, sound in _conditions(result):
+        if sound is None:
+            continue
+        paths = ("motor", "mesh", "structure") if with_structure else ("motor", "mesh")
+        row: list[Cell] = [state.condition.name, state.condition.train_speed_km_h, sound.sound_power_level_db("motor")]
+        row += [sound.level_db(surface, path) for path in (*paths, "total")]
+        rows.append([*row, sound.level_db(surface, weighting="A")])
     return Table("levels-4-m", "Levels around the drive, by what makes them", columns, rows, origin="calculated")
+
+
+def _sources(tones: Sequence[Sequence[Cell]], surface: str) -> Table:
+    columns = (
+        Column("condition", "Condition"),
+        Column("path", "Path"),
+        Column("name", "Source"),
+        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
+        Column("sound_power_level_db", "Sound power level", "dB re 1 pW", 1, "number"),
+        Column("surface_db", "Level", f"dB, {surface}", 1, "number"),
+    )
+    return Table("sound-sources", "Sources", columns, tones, origin="calculated")
 
 
 def _figure(result: FleetPrediction, levels: dict[str, np.ndarray]) -> Figure:
     speeds = np.array([state.condition.train_speed_km_h for state in result.prediction.conditions])
     order = np.argsort(speeds)
     surface = result.prediction.surface
-    lines = [Line(speeds[order], levels["total"][order], "total", color=7, points=True)]
+    lines = []
+    if np.isfinite(levels["total"]).any():
+        lines.append(Line(speeds[order], levels["total"][order], "total", color=7, points=True))
     lines += [
-        Line(speeds[order], levels[path][order], name, color=slot, points=True, style="dashed")
-        for path, name, slot in _PATHS
-        if np.isfinite(levels[path]).any()
+        path_line(result.fleet, path, speeds[order], levels[path.key][order])
+        for path in PATHS
+        if np.isfinite(levels[path.key]).any()
     ]
     return Figure(
         "level-over-speed",

@@ -1,0 +1,203 @@
+"""How loud the drive is in each direction around it, by condition and by helix angle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tdacoustic.drive import Directivity
+from tdacoustic.drive.levels import paths_of_total
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
+from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
+from tdacoustic.reporting.sections.sound_paths import heard_paths, is_added
+from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["directivity"]
+
+FLAT_DB: Final = 0.05
+"""Between the loudest and the quietest direction, below which a level is the same all around as it is printed."""
+SHAPED_DB: Final = 1.0
+"""From which a shape is drawn and compared with that of other conditions."""
+MOST_LINES: Final = 8
+
+_SIDES: Final = ((0.0, "travel"), (90.0, "left"), (180.0, "back"), (270.0, "right"))
+
+
+class Around(NamedTuple):
+    """A circle with the words for what it is of."""
+
+    name: str
+    circle: Directivity
+
+    @property
+    def range_db(self) -> float:
+        """From the quietest to the loudest direction."""
+        return float(np.ptp(self.circle.level_db))
+
+
+def directivity(result: FleetPrediction) -> Section | None:
+    """Return the section on the level around the drive; None where it is the same in all directions."""
+    speeds, angles = _over_speed(result), _over_helix(result)
+    if not any(around.range_db >= FLAT_DB for around in (*speeds, *angles)):
+        return None
+    blocks: list[Block] = [Paragraph(_method(result))]
+    if speeds:
+        said = _speed_words(result, speeds)
+        blocks += [Sentences(said)] if said else []
+        blocks += _figures("directivity", "the conditions", speeds)
+        blocks.append(_table("directivity-conditions", "The level around the drive, by condition", "Condition", speeds))
+    if angles:
+        caption = "The level around the drive, by helix angle"
+        table = _table("directivity-helix-angles", caption, "Helix angle", angles)
+        folded: list[Block] = [
+            *_figures("directivity-helix", "the helix angles, at the fastest condition", angles),
+            table,
+        ]
+        blocks.append(Details("Directions over the helix angles", folded))
+    return Section("directivity", "Directions", blocks)
+
+
+def _over_speed(result: FleetPrediction) -> list[Around]:
+    """Circles of the conditions that make a sound, by speed."""
+    circles = [circle for circle in result.prediction.directivity if circle.sweep == "speed"]
+    named = [
+        Around(f"{sound.condition} ({circle.value:.4g} km/h)", circle)
+        for sound, circle in zip(result.prediction.sound, circles, strict=False)
+        if np.isfinite(circle.level_db).all()
+    ]
+    return sorted(named, key=lambda around: around.circle.value)
+
+
+def _over_helix(result: FleetPrediction) -> list[Around]:
+    """Circles of the helix sweep by angle; none where the fleet names no angles."""
+    if result.fleet.operation.helix_angle_deg is None:
+        return []
+    held = [circle for circle in result.prediction.directivity if circle.sweep == "helix"]
+    named = [Around(f"{circle.value:g}°", circle) for circle in held if np.isfinite(circle.level_db).all()]
+    return sorted(named, key=lambda around: around.circle.value)
+
+
+def _method(result: FleetPrediction) -> str:
+    radius_m = result.fleet.radiation.circle_radius_m.value
+    added = [path.phrase for path in heard_paths(result.prediction.sound) if is_added(result.fleet, path)]
+    return (
+        f"Levels on a circle of {radius_m:g} m around the drive's centre in the plane z = 0, every 5°. 0° is the "
+        "direction of travel (x), 90° is to the left (y), 180° is behind, 270° is to the right. The levels are those "
+        f"of the total, which adds {joined(added)}."
+    )
+
+
+def _speed_words(result: FleetPrediction, speeds: list[Around]) -> list[str]:
+    widest = max(speeds, key=lambda around: around.range_db)
+    found = [f"the directions differ most in condition {widest.name}, by {widest.range_db:.1f} dB"]
+    return [sentence(text) for text in (*found, _beyond_words(result), _shape_words(result, speeds)) if text]
+
+
+def _beyond_words(result: FleetPrediction) -> str:
+    """Conditions of whose directions the housing is no part; empty of none."""
+    housing = result.prediction.housing
+    if housing is None:
+        return ""
+    low, high = housing.range_hz
+    adds, beyond = paths_of_total(result.fleet), []
+    for sound in result.prediction.sound:
+        added = [source.frequency_hz for source in sound.sources if source.path in adds]
+        if added and not any(low <= frequency <= high for frequency in added):
+            beyond.append(sound.condition)
+    if not beyond:
+        return ""
+    return (
+        f"all that the total adds in condition{'s' if len(beyond) > 1 else ''} {joined(beyond)} lies outside of the "
+        f"{low:.0f} to {high:.0f} Hz that the housing is computed for, so that the housing has no part in the "
+        "directions there"
+    )
+
+
+def _shape_words(result: FleetPrediction, speeds: list[Around]) -> str:
+    """How alike the shapes are; empty of fewer than two that are no circles."""
+    shaped = [around for around in speeds if around.range_db >= SHAPED_DB]
+    if len(shaped) < 2:
+        return ""
+    alike = np.corrcoef([around.circle.level_db for around in shaped])[np.triu_indices(len(shaped), 1)]
+    ends = list(dict.fromkeys(f"{value:.2f}" for value in (float(alike.min()), float(alike.max()))))
+    text = (
+        f"the shapes of the {len(shaped)} conditions with {SHAPED_DB:g} dB or more between directions correlate in "
+        f"pairs with {' to '.join(ends)} (1 is the same shape)"
+    )
+    if is_of_the_paper(result.fleet):
+        text += f"; {PAPER} calls the shape invariant with speed"
+    return pretty_signs(text)
+
+
+def _figures(name: str, of_what: str, held: Sequence[Around]) -> list[FigureBlock]:
+    """The levels, and the same relative to the loudest direction of each."""
+    shown = _spread(held)
+    some = "" if len(shown) == len(held) else f" {len(shown)} of {len(held)} are drawn."
+    levels = [around.circle.level_db for around in shown]
+    axis = Axis("Sound pressure level", "dB", reference="20 µPa")
+    title = f"Level around the drive over the direction, {of_what}"
+    found = [_figure(name, title, some.strip(), axis, shown, levels)]
+    if len(shown) > 1 and any(around.range_db >= SHAPED_DB for around in shown):
+        relative = [values - values.max() for values in levels]
+        axis = Axis("Level", "dB", reference="the loudest direction")
+        title = f"Shape of the level around the drive, {of_what}"
+        caption = f"Each relative to its own loudest direction.{some}"
+        found.append(_figure(f"{name}-shape", title, caption, axis, shown, relative))
+    return [FigureBlock(figure, "calculated") for figure in found]
+
+
+def _spread(held: Sequence[Around]) -> list[Around]:
+    """At most `MOST_LINES` of them, from the first to the last."""
+    places = np.unique(np.linspace(0, len(held) - 1, min(MOST_LINES, len(held))).round().astype(int))
+    return [held[place] for place in places]
+
+
+def _figure(
+    name: str,
+    title: str,
+    caption: str,
+    axis: Axis,
+    shown: Sequence[Around],
+    levels: Sequence[NDArray[np.float64]],
+) -> Figure:
+    elements: list[Element] = [
+        Line(np.append(around.circle.angle_deg, 360.0), np.append(values, values[0]), around.name)
+        for around, values in zip(shown, levels, strict=True)
+    ]
+    elements += [Rule(angle, side) for angle, side in _SIDES]
+    return Figure(name, title, caption, Axis("Direction", "°", limits=(0.0, 360.0)), axis, elements, height=380)
+
+
+def _table(name: str, caption: str, of: str, held: Sequence[Around]) -> Table:
+    columns = (
+        Column("of", of),
+        Column("loudest_db", "Loudest", "dB", 1, "number"),
+        Column("loudest_deg", "at", "°", 0, "number"),
+        Column("quietest_db", "Quietest", "dB", 1, "number"),
+        Column("quietest_deg", "at", "°", 0, "number"),
+        Column("range_db", "Range", "dB", 1, "number"),
+    )
+    rows: list[list[Cell]] = []
+    for around in held:
+        circle, row = around.circle, list[Cell]([around.name])
+        for place in (int(circle.level_db.argmax()), int(circle.level_db.argmin())):
+            at = None if around.range_db < FLAT_DB else float(circle.angle_deg[place])
+            row += [float(circle.level_db[place]), at]
+        rows.append([*row, around.range_db])
+    return Table(name, caption, columns, rows, origin="calculated")

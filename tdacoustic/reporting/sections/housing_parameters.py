@@ -1,0 +1,59 @@
+"""Words for the parameters of the housing and of the sound field."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tdacoustic.fleet import Fleet
+
+__all__ = ["HOUSING_SECTIONS", "housing_named"]
+
+HOUSING_SECTIONS: Final = ("housing.", "radiation.", "model.")
+"""What keys of `housing_named` begin with, places of sources aside."""
+
+_FIELD: Final = {
+    "radiation.method": ("How the sound field is computed", ""),
+    "radiation.space": ("Space around the drive", ""),
+    "radiation.max_frequency_hz": ("Frequency up to which forces are listed", "Hz"),
+    "radiation.sphere_radius_m": ("Radius of the surface that levels are averaged over", "m"),
+    "radiation.circle_radius_m": ("Radius of the circle of directions", "m"),
+    "radiation.temperature_degc": ("Temperature of the air", "°C"),
+    "model.gear_path": ("What of the gears the total adds", ""),
+    "model.motor_gain_db": ("Added to the motor's sound power levels", "dB"),
+}
+_WITH_HOUSING: Final = {
+    "radiation.max_frequency_hz": ("Highest frequency of the housing and of listed forces", "Hz"),
+    "radiation.elements_per_wavelength": ("Boundary elements a wavelength", ""),
+    "model.structure_gain_db": ("Added to the structure's levels", "dB"),
+    "motor.position_m": ("Position of the motor's sources, x, y, z", "m"),
+    "masuda.position_m": ("Position of the mesh's source, x, y, z", "m"),
+    "housing.size_m": ("Housing: size along the shafts, along travel, up", "m"),
+    "housing.position_m": ("Housing: its middle in the drive's frame, x, y, z", "m"),
+    "housing.wall_mm": ("Housing: thickness of the end walls", "mm"),
+    "housing.bearing_panel_mm": ("Housing: thickness of the bearing panels", "mm"),
+    "housing.top_bottom_mm": ("Housing: thickness of top and bottom", "mm"),
+    "housing.material.modulus_gpa": ("Housing: modulus of elasticity", "GPa"),
+    "housing.material.density_kg_m3": ("Housing: density", "kg/m³"),
+    "housing.material.poisson": ("Housing: Poisson's ratio", ""),
+    "housing.loss_factor": ("Housing: loss factor", ""),
+    "housing.hanger_stiffness_n_per_m": ("Housing: stiffness of the hanger, x, y, z", "N/m"),
+}
+_SEAT: Final = {
+    "position_m": ("x and z of the shaft, y of its gear", "m"),
+    "radius_m": ("radius", "m"),
+    "thickness_mm": ("thickness, panel included", "mm"),
+    "stiffness_n_per_m": ("springs at each of the two, x, y, z", "N/m"),
+}
+
+
+def housing_named(fleet: Fleet, key: str) -> tuple[str, str] | None:
+    """Return words and unit of a parameter of housing or sound field that the model uses, None of another."""
+    with_housing = fleet.radiation.method.value == "boundary_elements"
+    if with_housing and key in _WITH_HOUSING:
+        return _WITH_HOUSING[key]
+    if with_housing and key.startswith("housing.seat.") and fleet.housing is not None:
+        number, _, last = key.removeprefix("housing.seat.").partition(".")
+        if last in _SEAT:
+            words, unit = _SEAT[last]
+            return f"Seats of the {fleet.housing.seat[int(number) - 1].shaft}: {words}", unit
+    return _FIELD.get(key)
