@@ -12,8 +12,8 @@ planes eight systems of an eighth of the size, 1/64 of the work.
 
 How good it is, on the reference housing 0.45 x 1.0 x 0.9 m with the mean velocity of each panel (the value at its
 centre is worse where a panel is not small against a bending wave): 7.5 panels a wavelength give the level of patterns
-on one side at 4 m within 0.22 dB, 11 within 0.08 dB (700 and 1000 Hz, tests/evidence). That takes some 500 panels on the
-body, however long the wave: a sphere of 96 panels is off by 0.4 dB.
+on one side at 4 m within 0.22 dB, 11 within 0.08 dB (700 and 1000 Hz, tests/evidence). That takes some 500 panels on
+the body, however long the wave: a sphere of 96 panels is off by 0.4 dB.
 
 Sources: A. J. Burton, G. F. Miller, Proc. R. Soc. A 323 (1971) 201; the sign of the coupling: S. Marburg, J. Comput.
 Acoust. 24 (2016) 1550016.

@@ -27,7 +27,8 @@ class FleetPrediction:
     fleet : Fleet
     prediction : Prediction
     tables : mapping of str to DataFrame
-        ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``.
+        ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix``,
+        ``speed_sweep``.
     inputs : tuple of LogInput
         The fleet file.
     records : tuple of (str, Record)

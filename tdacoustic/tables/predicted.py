@@ -24,8 +24,9 @@ HARMONICS_AT_LEAST = 10
 def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.DataFrame]:
     """Return the tables of a prediction as frames, by name.
 
-    ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix`` and ``speed_sweep``;
-    the last is left out where it was not computed. Columns of parts that the model does not have are empty.
+    ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix`` and
+    ``speed_sweep``; the last is left out where it was not computed. Columns of parts that the model does not have are
+    empty.
 
     Parameters
     ----------

@@ -4,9 +4,9 @@
 
 Both sides are this program's boundary elements with the same modes, forces, grids and receivers (mean over the 4 m
 sphere and 72 points at 12 m), so the ratios are those of the method alone. The direct side solves each line of each
-condition on the grid for its frequency. The paper's ten cases are six speeds and four helix angles. Times are wall-clock
-with one thread, except the one-off, which uses all cores as the program does; run on an otherwise idle machine. Without
---store the one-off starts from nothing.
+condition on the grid for its frequency. The paper's ten cases are six speeds and four helix angles. Times are
+wall-clock with one thread, except the one-off, which uses all cores as the program does; run on an otherwise idle
+machine. Without --store the one-off starts from nothing.
 """
 
 from __future__ import annotations
@@ -77,9 +77,8 @@ def main() -> None:
         records = dict(housing_sound(fleet, store)[1])
     housing = kept[-1]
     model = DriveModel(fleet, housing=housing)
-    print(
-        f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}, to {options.highest_hz:g} Hz"
-    )
+    versions = f"python {platform.python_version()}, numpy {np.__version__}, {platform.machine()}"
+    print(f"{versions}, to {options.highest_hz:g} Hz")
     steps: dict[str, float] = {}
     for record in records.values():
         steps[record.step] = steps.get(record.step, 0.0) + record.wall_s
