@@ -20,6 +20,7 @@ from tdacoustic.drive import (
     SoundSource,
     torque_at,
 )
+from tdacoustic.drive.levels import paths_of_total
 from tdacoustic.errors import FittingError, FleetError, TdacousticError
 from tdacoustic.fitting.measured_level import OFFSET, MeasuredLevel, offset_name
 from tdacoustic.fitting.parameters import FreeParameter
@@ -54,8 +55,9 @@ OUTSIDE_TRANSFER: Final = ("housing.loss_factor",)
 
 SILENCE_DB: Final = -200.0
 
-Motion: TypeAlias = tuple[float, float, BearingForces]
-"""Peak-to-peak transmission error and static compression in m, all that the meshing noise depends on; the forces."""
+Motion: TypeAlias = tuple[float, float, BearingForces | None]
+"""Peak-to-peak transmission error and static compression in m, all that the meshing noise depends on; the forces where
+the total adds what the housing makes of them."""
 
 Values: TypeAlias = Mapping[str, float]
 Key: TypeAlias = tuple[tuple[str, float], ...]
@@ -95,6 +97,7 @@ class LevelModel:
         self._places = tuple(datum.place for datum in data)
         self._computed = _Computed()
         self._response: Response | None = None
+        self._with_forces = "structure" in paths_of_total(fleet)
         self._gains = {key: float(fleet.get(key).value) for key in GAINS}
 
     def with_data(self, data: Sequence[MeasuredLevel]) -> LevelModel:
@@ -142,7 +145,12 @@ class LevelModel:
         model = DriveModel(fleet, unit, self.housing)
         held = zip(self.conditions, self._conditions(fleet, values), motions, strict=True)
         return tuple(
-            model.sound(condition, model.masuda_db(condition, dte_m, static_m), self._receivers(known), forces)
+            model.sound(
+                condition,
+                model.masuda_db(condition, dte_m, static_m),
+                self._receivers(known),
+                model.gears(condition).forces if forces is None else forces,
+            )
             for known, condition, (dte_m, static_m, forces) in held
         )
 
@@ -208,8 +216,7 @@ class LevelModel:
         mesh, structure = [], []
         for condition, (dte_m, static_m, forces) in zip(conditions, motions, strict=True):
             mesh.append(model.gear_sources(condition, model.masuda_db(condition, dte_m, static_m)))
-            added = "structure" in model.field.adds
-            structure.append(model.field.structure_sources(forces) if added else ())
+            structure.append(model.field.structure_sources(forces))
         return np.concatenate([self._at_data(model, mesh), self._at_data(model, structure)])
 
     def _at_data(self, model: DriveModel, of_conditions: Sequence[Sequence[SoundSource]]) -> Real:
@@ -234,9 +241,9 @@ class LevelModel:
         key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(DYNAMIC)))
         known = self._computed.motions
         if key not in known:
-            model = DriveModel(fleet, housing=self.housing)
+            model = DriveModel(fleet)
             states = [model.motion(condition) for condition in self._conditions(fleet, values)]
-            forces = [bearing_forces(model.unit.system, state) for state in states]
+            forces = [bearing_forces(model.unit.system, state) if self._with_forces else None for state in states]
             held = zip(states, forces, strict=True)
             known[key] = model.unit, tuple((s.dte_pp_m, s.static_compression_m, of) for s, of in held)
         return known[key]
