@@ -1,4 +1,4 @@
-"""Natural modes of a structure up to a frequency: Lanczos with shift and inversion (ARPACK on NGSolve's factors)."""
+"""Natural modes of a structure up to a frequency: block Lanczos with shift and inversion, on NGSolve's factors."""
 
 from __future__ import annotations
 
@@ -15,15 +15,20 @@ __all__ = ["natural_modes", "residual_modes", "static_deflections"]
 
 Real = NDArray[np.float64]
 
-_TOLERANCE: Final = 1e-7
-"""Of ARPACK; the quotients that follow square the error."""
+_BLOCK: Final = 8
+"""Vectors that Lanczos takes at a time: they share the passes over the basis, and as many equal eigenvalues are found.
 
-_LOW: Final = 0.2
-"""Modes with λ below this part of the shift are iterated once more, with K⁻¹ M.
-
-Where λ is small against the shift, what rounding adds of very stiff motions (1e-6 of a vector) still shows in λ: 1 % in
-the first modes of the reference housing.
+A free body on springs spread like its mass has six.
 """
+
+_TOLERANCE: Final = 1e-6
+"""Residual over the eigenvalue of (K - shift M)⁻¹ M at which a mode counts as found; its λ is right to the square."""
+
+_REACH: Final = 1.02
+"""Modes are looked for up to this times the distance that is wanted, so that those at the ends are well held."""
+
+_LOW: Final = 0.01
+"""Below this part of the shift λ is a small difference of large numbers, and is taken from K instead."""
 
 _NOT_NEW: Final = 1e-6
 """A residual deflection below this part of the whole deflection says nothing new."""
@@ -32,15 +37,14 @@ _NOT_NEW: Final = 1e-6
 def natural_modes(structure: Structure, highest_hz: float, expected: int) -> tuple[Real, Real]:
     """Return all natural frequencies up to a frequency, and modes with a modal mass of 1 kg.
 
-    The shift lies in the middle of the wanted λ = ω², so that the eigenvalues nearest to it are all wanted ones; where
-    `expected` was too few, it is raised until they reach 0 and the highest.
+    The shift lies in the middle of the wanted λ = ω², so that the eigenvalues nearest to it are all wanted ones.
 
     Parameters
     ----------
     structure : Structure
     highest_hz : float
     expected : int
-        Number of modes that is taken for enough at first.
+        About how many there are: from when on it pays to look whether all are found.
 
     Returns
     -------
@@ -55,19 +59,11 @@ def natural_modes(structure: Structure, highest_hz: float, expected: int) -> tup
         A mode without stiffness: a structure that is not held.
     """
     middle = 0.5 * (2.0 * math.pi * highest_hz) ** 2
-    inverse = structure.shifted(middle)
-    most = structure.unknowns // 3
-    number = min(expected, most)
-    while True:
-        values, vectors = _nearest(structure, inverse, middle, number)
-        if np.abs(values - middle).max() >= middle or number >= most:
-            break
-        number = min(math.ceil(1.2 * number), most)
+    values, vectors = _nearest(structure, structure.shifted(middle), middle, expected)
     low = values < _LOW * middle
-    vectors[low] = structure.applied(structure.flexibility, structure.applied(structure.mass, vectors[low]))
-    vectors[low] *= np.abs(values[low, None])
-    values, vectors = _ritz(structure, vectors)
-    wanted = values <= 2.0 * middle
+    values[low], vectors[low] = _ritz(structure, vectors[low])
+    ascending = np.argsort(values)
+    wanted = ascending[values[ascending] <= 2.0 * middle]
     values, vectors = values[wanted], vectors[wanted]
     if values.size and values[0] <= 0.0:
         raise HousingError("the housing is not held: a mode has no stiffness")
@@ -76,29 +72,48 @@ def natural_modes(structure: Structure, highest_hz: float, expected: int) -> tup
 
 
 def _nearest(structure: Structure, inverse: object, shift: float, number: int) -> tuple[Real, Real]:
-    """Return the eigenvalues nearest to the shift and their vectors, shape (number, unknowns)."""
-    from scipy.sparse.linalg import LinearOperator, eigsh
+    """Return the eigenvalues less than the shift away from it, and their vectors with a modal mass of 1.
 
+    Block Lanczos with (K - shift M)⁻¹ M, the whole basis kept orthogonal in M. After about as many vectors as are
+    expected it looks now and then whether all Ritz values within reach have converged.
+    """
     size = structure.unknowns
+    basis = np.empty((2 * number + 10 * _BLOCK, size))
+    projected = np.zeros((len(basis), len(basis)))
+    start = np.random.default_rng(0).standard_normal((_BLOCK, size))
+    block, massed, _ = _normal(structure, structure.applied(inverse, structure.massed(start)))
+    held, look = 0, number
+    while True:
+        if held + 2 * _BLOCK > len(basis):
+            basis = np.concatenate([basis, np.empty_like(basis)])
+            projected = np.pad(projected, (0, len(projected)))
+        new, held = slice(held, held + _BLOCK), held + _BLOCK
+        basis[new] = block
+        block = structure.applied(inverse, massed)
+        for _ in range(2):
+            part = basis[:held] @ structure.massed(block).T
+            block -= part.T @ basis[:held]
+            projected[:held, new] += part
+        block, massed, length = _normal(structure, block)
+        projected[held : held + _BLOCK, new] = length.T
+        if held >= look or held >= size // 3:
+            values, combined = np.linalg.eigh(projected[:held, :held], UPLO="U")
+            near = np.abs(values) * _REACH * shift > 1.0
+            left = np.linalg.norm(length.T @ combined[new][:, near], axis=0)
+            if (left <= _TOLERANCE * np.abs(values[near])).all() or held >= size // 3:
+                return shift + 1.0 / values[near], combined[:, near].T @ basis[:held]
+            look = held + max(_BLOCK, number // 10)
 
-    def operator(matrix: object) -> LinearOperator:
-        def apply(vector: Real) -> Real:
-            return structure.applied(matrix, vector.reshape(1, size))[0]
 
-        return LinearOperator((size, size), matvec=apply, dtype=np.float64)
-
-    values, vectors = eigsh(
-        operator(structure.stiffness),
-        number,
-        operator(structure.mass),
-        sigma=shift,
-        OPinv=operator(inverse),
-        which="LM",
-        ncv=min(size, math.ceil(1.5 * number) + 20),
-        tol=_TOLERANCE,
-        v0=np.random.default_rng(0).standard_normal(size),
-    )
-    return values, np.ascontiguousarray(vectors.T)
+def _normal(structure: Structure, block: Real) -> tuple[Real, Real, Real]:
+    """Return vectors made orthogonal among themselves with a modal mass of 1, M times them, and L of block = L new."""
+    lengths = np.eye(len(block))
+    for _ in range(2):
+        massed = structure.massed(block)
+        length = np.linalg.cholesky(block @ massed.T)
+        block, massed = np.linalg.solve(length, block), np.linalg.solve(length, massed)
+        lengths = lengths @ length
+    return block, massed, lengths
 
 
 def _ritz(structure: Structure, vectors: Real) -> tuple[Real, Real]:
@@ -106,7 +121,7 @@ def _ritz(structure: Structure, vectors: Real) -> tuple[Real, Real]:
     from scipy.linalg import eigh
 
     stiffness = vectors @ structure.applied(structure.stiffness, vectors).T
-    mass = vectors @ structure.applied(structure.mass, vectors).T
+    mass = vectors @ structure.massed(vectors).T
     values, combined = eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
     return values, combined.T @ vectors
 
@@ -139,12 +154,12 @@ def residual_modes(structure: Structure, frequency_hz: Real, modes: Real) -> tup
         Of modal mass 1 kg, orthogonal to `modes` in mass and stiffness; r is at most the number of loads.
     """
     whole = static_deflections(structure)
-    size = np.sqrt(np.einsum("iu,iu->i", whole, structure.applied(structure.mass, whole)))
+    size = np.sqrt(np.einsum("iu,iu->i", whole, structure.massed(whole)))
     rest = whole.copy()
     for _ in range(2):
-        rest -= (rest @ structure.applied(structure.mass, modes).T) @ modes
+        rest -= (structure.massed(rest) @ modes.T) @ modes
     rest /= size[:, None]
-    gram = rest @ structure.applied(structure.mass, rest).T
+    gram = rest @ structure.massed(rest).T
     squared, combined = np.linalg.eigh(0.5 * (gram + gram.T))
     new = squared > _NOT_NEW**2
     if not new.any():

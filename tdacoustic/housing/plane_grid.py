@@ -26,6 +26,7 @@ Disc = tuple[tuple[float, float], float]
 _LONGEST: Final = 1.3
 """Largest edge inside over edge on the outline: Netgen then leaves the outline's points as they are."""
 
+BANDED = 99
 _GRADING: Final = 2.0
 """How fast cells may grow (Netgen's parameter); below, short edges of a disc cut the outline's edges next to it."""
 
@@ -43,12 +44,15 @@ class PlaneGrid:
         0 outside of all discs, else the number of the disc, from 1.
     joints : ndarray of bool, shape (m,)
         Cells of the narrow bands along the outline and on both sides of the discs' rims.
+    narrow : ndarray of int, shape (e, 2)
+        Edges that run across these bands.
     """
 
     points_m: Real
     cells: Whole
     parts: Whole
     joints: NDArray[np.bool_]
+    narrow: Whole
 
 
 def edge_points(length_m: float, edge_m: float) -> int:
@@ -76,7 +80,12 @@ def circle(disc: Disc, edge_m: float) -> Real:
 
 
 def plane_grid(
-    outline_m: Real, discs: Sequence[Disc], edge_m: float, faces: Faces = "triangles", band_m: float = 0.0
+    outline_m: Real,
+    discs: Sequence[Disc],
+    edge_m: float,
+    faces: Faces = "triangles",
+    band_m: float = 0.0,
+    rim_band_m: float = 0.0,
 ) -> PlaneGrid:
     """Return the grid inside an outline whose points it keeps; discs are embedded as polygons of equal area.
 
@@ -91,8 +100,10 @@ def plane_grid(
     faces : {"triangles", "quadrilaterals"}
         Quadrilaterals leave some triangles.
     band_m : float
-        Width of a band of cells along the inside of the outline, which must be a rectangle around the origin then, and
-        of one on each side of the discs' rims, where the field changes over the thickness; 0: none.
+        Width of a band of quadrilaterals along the inside of the outline, which must be a rectangle around the origin
+        then; 0: none.
+    rim_band_m : float
+        Of one on each side of the discs' rims; 0: none.
 
     Raises
     ------
@@ -101,22 +112,24 @@ def plane_grid(
     HousingError
         Netgen did not keep the points that it was given; other lengths of edges may do.
     """
-    loops, bands, regions = _loops(outline_m, discs, edge_m, band_m)
+    loops, bands, regions = _loops(outline_m, discs, edge_m, band_m, rim_band_m)
     starts = np.cumsum([0, *(len(loop) for loop in loops)])
     numbers = [np.arange(start, end) for start, end in itertools.pairwise(starts)]
     points, cells, parts = _netgen_cells(loops, numbers, regions, edge_m, faces)
     every = [(cells, parts, np.zeros(len(cells), dtype=bool))]
+    narrow = [np.empty((0, 2), dtype=np.int64)]
     for outer, inner, part in bands:
-        strip = _strip(numbers[outer], numbers[inner], faces)
+        strip = _strip(numbers[outer], numbers[inner])
         every.append((strip, np.full(len(strip), part), np.ones(len(strip), dtype=bool)))
+        narrow.append(np.column_stack([numbers[outer], numbers[inner]]))
     cells, parts, joints = (np.concatenate(column) for column in zip(*every, strict=True))
-    return PlaneGrid(np.vstack([*loops, points]), cells, parts, joints)
+    return PlaneGrid(np.vstack([*loops, points]), cells, parts, joints, np.concatenate(narrow))
 
 
 Loops = tuple[list[Real], list[tuple[int, int, int]], list[tuple[int, int, int]]]
 
 
-def _loops(outline_m: Real, discs: Sequence[Disc], edge_m: float, band_m: float) -> Loops:
+def _loops(outline_m: Real, discs: Sequence[Disc], edge_m: float, band_m: float, rim_band_m: float) -> Loops:
     """Return loops of points, bands (outer loop, inner loop, part) and Netgen's borders (loop, inside, outside).
 
     Netgen's domains are numbered from 1, the parts from 0; 0 on a side of a border is no domain of Netgen's.
@@ -130,9 +143,9 @@ def _loops(outline_m: Real, discs: Sequence[Disc], edge_m: float, band_m: float)
     for part, ((x, y), radius) in enumerate(discs, start=1):
         first = len(loops)
         rim = circle(((x, y), radius), edge_m)
-        widths = (band_m, 0.0, -band_m) if band_m else (0.0,)
+        widths = (rim_band_m, 0.0, -rim_band_m) if rim_band_m else (0.0,)
         loops += [(x, y) + (rim - (x, y)) * (1.0 + width / radius) for width in widths]
-        if band_m:
+        if rim_band_m:
             bands += [(first, first + 1, 0), (first + 1, first + 2, part)]
             regions += [(first, 0, 1), (first + 2, part + 1, 0)]
         else:
@@ -172,13 +185,9 @@ def _netgen_cells(
     return points[len(given) :], cells, np.array([element.index - 1 for element in elements], dtype=np.int64)
 
 
-def _strip(outer: Whole, inner: Whole, faces: Faces) -> Whole:
-    """Return the cells between two loops of as many points."""
-    quadrilaterals = np.column_stack([outer, np.roll(outer, -1), np.roll(inner, -1), inner])
-    if faces == "quadrilaterals":
-        return quadrilaterals
-    halves = np.concatenate([quadrilaterals[:, [0, 1, 2]], quadrilaterals[:, [0, 2, 3]]])
-    return np.column_stack([halves, np.full(len(halves), -1)])
+def _strip(outer: Whole, inner: Whole) -> Whole:
+    """Return the quadrilaterals between two loops of as many points."""
+    return np.column_stack([outer, np.roll(outer, -1), np.roll(inner, -1), inner])
 
 
 def missing_ngsolve() -> MissingPackageError:

@@ -3,7 +3,8 @@
 A panel is a flat grid extruded through its thickness. It ends where its neighbours begin: the beams along the twelve
 edges are rows of hexahedra, the eight corners single ones. So no cell is slanted, and the welded edges, whose turning
 decides the first modes, are resolved: with prisms mitred along the edges instead, 100 mm wide, modes came out up to
-10 % too high. For the same reason bands as wide as a panel is thick follow its edges and both sides of its seats' rims.
+10 % too high. For the same reason bands as wide as a panel is thick follow its edges and both sides of its seats' rims:
+quadrilaterals, so that a low order is enough across them.
 """
 
 from __future__ import annotations
@@ -57,7 +58,7 @@ class SolidGrid:
         Indices into `face_names`.
     face_names : tuple of str
     across : ndarray of int, shape (e, 2)
-        Edges of cells that run through a wall's thickness.
+        Edges of cells that are about as short as a wall is thick: through it, or across a narrow band.
     joints : ndarray of bool, shape (m,)
         Cells at welded edges and seats, where the field through the thickness is not that of a plate.
     """
@@ -102,10 +103,10 @@ def joined(pieces: list[Piece], part_names: tuple[str, ...], face_names: tuple[s
     )
     every = np.concatenate([cells.reshape(-1, 3), faces.reshape(-1, 3), across.reshape(-1, 3)])
     there = ~np.isnan(every[:, 0])
-    keys = np.round(every[there] / _SAME_POINT_M).astype(np.int64)
-    _, kept, merged = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    merged = _merged(every[there])
+    _, kept = np.unique(merged, return_index=True)
     number = np.full(len(every), -1, dtype=np.int64)
-    number[there] = merged.ravel()
+    number[there] = merged
     ends = np.cumsum([cells.size // 3, faces.size // 3])
     of_cells, of_faces, of_across = np.split(number, ends)
     return SolidGrid(
@@ -119,6 +120,21 @@ def joined(pieces: list[Piece], part_names: tuple[str, ...], face_names: tuple[s
         np.unique(np.sort(of_across.reshape(-1, 2), axis=1), axis=0),
         np.concatenate([piece.joints for piece in pieces]),
     )
+
+
+def _merged(points_m: Real) -> Whole:
+    """Return the numbers of points, the same for those at the same place.
+
+    By their distances: rounded coordinates part where rounding errors lie on two sides of a half, and a grid that is
+    cut along an edge still gives modes.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import KDTree
+
+    pairs = KDTree(points_m).query_pairs(_SAME_POINT_M, output_type="ndarray")
+    links = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(points_m), len(points_m)))
+    return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
 
 
 def extruded(flat: PlaneGrid, low_m: Real, high_m: Real, parts: Whole, face_part: int) -> Piece:
@@ -140,8 +156,8 @@ def extruded(flat: PlaneGrid, low_m: Real, high_m: Real, parts: Whole, face_part
     cells[~triangle, :4], cells[~triangle, 4:] = low[~triangle], high[~triangle]
     used = np.unique(flat.cells[flat.cells >= 0])
     faces = high if face_part >= 0 else high[:0]
-    across = np.stack([low_m[used], high_m[used]], axis=1)
-    return Piece(cells, parts, faces, np.full(len(faces), face_part), across, flat.joints | (parts > 0))
+    across = [np.stack([low_m[used], high_m[used]], axis=1), low_m[flat.narrow], high_m[flat.narrow]]
+    return Piece(cells, parts, faces, np.full(len(faces), face_part), np.concatenate(across), flat.joints | (parts > 0))
 
 
 def _corners(points_m: Real, cells: Whole) -> Real:
@@ -180,7 +196,7 @@ def _band(box: Box, number: int) -> float:
         for seat in box.seats:
             for axis, place in zip((0, 2), seat.centre_m, strict=True):
                 gaps.append(0.5 * box.extent_m[axis] - box.thickness_m[axis] - abs(place) - seat.radius_m)
-    return min(box.thickness_m[normal], min(gaps) / 4.0, 0.25 * box.hanger_radius_m)
+    return min(box.thickness_m[normal], min(gaps) / 4.0)
 
 
 def _panel(box: Box, number: int, edge_m: float, faces: Faces) -> list[Piece]:
@@ -190,7 +206,8 @@ def _panel(box: Box, number: int, edge_m: float, faces: Faces) -> list[Piece]:
     first, second = (other for other in range(3) if other != normal)
     clear = [size - 2.0 * thick for size, thick in zip(box.extent_m, box.thickness_m, strict=True)]
     discs, names = _discs(box, axis, sign)
-    flat = plane_grid(rectangle(clear[first], clear[second], edge_m), discs, edge_m, faces, _band(box, number))
+    outline, band = rectangle(clear[first], clear[second], edge_m), _band(box, number)
+    flat = plane_grid(outline, discs, edge_m, faces, band, band if axis == "y" else 0.0)
     outwards = sign * np.cross(np.eye(3)[first], np.eye(3)[second])[normal] > 0.0
     flat = flat if outwards else _turned(flat)
 
@@ -205,7 +222,7 @@ def _panel(box: Box, number: int, edge_m: float, faces: Faces) -> list[Piece]:
     pieces = [extruded(flat, inner, layer(0.0), parts, number)]
     for seat, part in zip(box.seats if axis == "y" else (), names, strict=False):
         of_it = parts == part
-        disc = PlaneGrid(flat.points_m, flat.cells[of_it], flat.parts[of_it], flat.joints[of_it])
+        disc = replace(flat, cells=flat.cells[of_it], parts=flat.parts[of_it], joints=flat.joints[of_it])
         pieces.append(extruded(disc, layer(seat.thickness_m), inner, parts[of_it], -1))
     return pieces
 

@@ -6,9 +6,11 @@ the triangle's Lagrange nodes keep it without loss.
 
 from __future__ import annotations
 
+import dataclasses
 import itertools
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,12 +18,22 @@ from numpy.typing import ArrayLike, NDArray
 from tdacoustic.housing.box import HousingError
 from tdacoustic.housing.solid_grid import PANELS
 
-__all__ = ["PanelNodes", "lattice", "panel_nodes"]
+__all__ = ["PanelNodes", "lattice", "panel_nodes", "read_only"]
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 _SAME_POINT_M = 1e-7
+
+
+def read_only(owner: Any) -> None:
+    """Make the arrays of a frozen dataclass read-only: copies of those that were not."""
+    for field in dataclasses.fields(owner):
+        value = getattr(owner, field.name)
+        if isinstance(value, np.ndarray) and value.flags.writeable:
+            kept = value.copy()
+            kept.flags.writeable = False
+            object.__setattr__(owner, field.name, kept)
 
 
 def lattice(order: int) -> Whole:
@@ -49,6 +61,9 @@ class PanelNodes:
     points_m: Real
     panels: Whole
     triangles: Whole
+
+    def __post_init__(self) -> None:
+        read_only(self)
 
     @cached_property
     def normals(self) -> Real:

@@ -39,12 +39,24 @@ def plate_modes(
     band_m=0.0,
 ):
     """Natural frequencies of a plate; springs by "plate", "rim x" and "rim y" (rims with that normal)."""
+    structure = plate_structure(outline_m, thickness_m, edge_m, springs, faces, order, poisson, band_m)
+    found, _ = natural_modes(structure, highest_hz, expected)
+    return found
+
+
+def plate_structure(
+    outline_m, thickness_m, edge_m, springs, faces="triangles", order=4, poisson=0.3, band_m=0.0, held=None
+):
+    """Matrices of a plate; its loads are unit forces on the whole of it. Only rims through `held` points, if given."""
     flat = plane_grid(outline_m, [], edge_m, faces, band_m)
     low, high = (np.column_stack([flat.points_m, np.full(len(flat.points_m), z)]) for z in (0.0, thickness_m))
     plate = extruded(flat, low, high, np.zeros(len(flat.cells), dtype=np.int64), 2)
     start, end = np.arange(len(outline_m)), np.roll(np.arange(len(outline_m)), -1)
     rims = np.stack([low[start], low[end], high[end], high[start]], axis=1)
     along = np.abs(outline_m[end] - outline_m[start])
+    if held is not None:
+        chosen = held(0.5 * (outline_m[end] + outline_m[start]))
+        rims, along = rims[chosen], along[chosen]
     rim = Piece(
         np.empty((0, 8, 3)),
         np.empty(0, dtype=np.int64),
@@ -54,6 +66,4 @@ def plate_modes(
         np.empty(0, dtype=bool),
     )
     grid = joined([plate, rim], ("plate",), (*RIMS, "top"))
-    structure = structure_of(grid, MODULUS_PA, poisson, DENSITY_KG_M3, springs, order=order)
-    found, _ = natural_modes(structure, highest_hz, expected)
-    return found
+    return structure_of(grid, MODULUS_PA, poisson, DENSITY_KG_M3, springs, loaded=("plate",), order=order)

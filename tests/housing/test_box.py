@@ -138,6 +138,34 @@ def test_the_split_keeps_each_gears_force():
         assert np.linalg.norm(whole) == pytest.approx(np.linalg.norm(pressing.amplitude_n[gear, :, 0]))
 
 
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 200.0])
+@pytest.mark.parametrize("gear_y_m", [0.0, 0.05])
+def test_mean_loads_balance_the_torques_on_the_shafts(degrees, gear_y_m):
+    """What bearings put on the box: no force in all, and the sum of both torques about the shafts, -y of the drive.
+
+    The gears' forces anew: the line of contact is normal to both base circles, F = T1 / (r1 cos βb).
+    """
+    torque_n_m, radii_m, base_helix, turn = 5913.0, (0.0995, 0.3677), math.radians(17.0), math.radians(degrees)
+    centre_distance_m = 0.495
+    angle = math.acos(sum(radii_m) / centre_distance_m)
+    normal = np.array([math.cos(base_helix) * math.sin(angle), math.cos(base_helix) * math.cos(angle), 0.0])
+    normal[2] = math.sin(base_helix)
+    force = torque_n_m / (radii_m[0] * math.cos(base_helix))
+    apart = 0.5 * centre_distance_m * np.array([math.cos(turn), math.sin(turn)])
+    seats = [
+        replace(seat, centre_m=tuple(place), radius_m=0.1, gear_y_m=gear_y_m)
+        for seat, place in zip(reference_box().seats, (-apart, apart), strict=True)
+    ]
+    box = reference_box(seats=tuple(seats))
+    loads = mean_seat_loads(box, forces(np.zeros((2, 3)), [-force * normal, force * normal]))
+    middle = 0.5 * (0.45 - 0.06)
+    places = [(*apart * side, y) for side in (-1.0, 1.0) for y in (middle, -middle)]
+    moment = sum(np.cross((x, y, z), load) for (x, z, y), load in zip(places, loads, strict=True))
+    assert loads.sum(axis=0) == pytest.approx(np.zeros(3), abs=1e-8)
+    # T2 = T1 r2 / r1; about the shafts, which the gears' z = -y of the drive points along
+    assert moment[1] == pytest.approx(-torque_n_m * (1.0 + radii_m[1] / radii_m[0]))
+
+
 def test_expected_modes_are_about_those_of_physics_md(conformance):
     # the estimate only starts the search for modes
     got = expected_modes(reference_box(), 3000.0)

@@ -1,6 +1,7 @@
 """The modes of a small box against direct solutions, other grids and symmetry; the response as arithmetic."""
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,10 +42,33 @@ def test_the_response_of_one_mode_is_that_of_an_oscillator():
 
 def test_a_response_beyond_the_modes_and_forces_of_another_shape_are_refused():
     modes = one_mode()
-    with pytest.raises(HousingError, match="modes are for up to 500 Hz, the response is asked for at 600 Hz"):
-        modes.response([600.0], np.zeros((4, 3, 1)))
+    for asked_hz in (600.0, -1.0, np.nan):
+        said = f"modes are for 0 to 500 Hz, the response is asked for at {asked_hz:g} Hz"
+        with pytest.raises(HousingError, match=said):
+            modes.response([10.0, asked_hz], np.zeros((4, 3, 2)))
+        with pytest.raises(HousingError, match=said):
+            modes.seat_compliance([asked_hz])
+    for loss in (0.0, -0.02, np.nan):
+        with pytest.raises(HousingError, match="loss_factor must be above 0 and at most 1, got"):
+            modes.response([10.0], np.zeros((4, 3, 1)), loss)
     with pytest.raises(HousingError, match=r"forces must have the shape \(4, 3, 2\), got \(4, 3, 1\)"):
         modes.response([10.0, 20.0], np.zeros((4, 3, 1)))
+
+
+def test_arrays_of_the_caller_stay_as_they_are():
+    modes = one_mode()
+    seats = np.zeros((1, 4, 3))
+    again = replace(modes, seats=seats)
+    seats[0, 0, 0] = 1.0
+    assert again.seats[0, 0, 0] == 0.0
+
+
+def test_modes_that_cannot_be_are_refused():
+    modes = one_mode()
+    with pytest.raises(HousingError, match="natural must be from 0 to the number of modes, 1, got 2"):
+        replace(modes, natural=2)
+    with pytest.raises(HousingError, match="frequency_hz of modes must be > 0"):
+        replace(modes, frequency_hz=np.array([0.0]))
 
 
 def test_arrays_are_read_only_and_can_be_kept():
@@ -185,11 +209,36 @@ def test_seats_close_to_each_other_and_to_a_wall_can_be_gridded(edge_m):
     grid = box_grid(box, edge_m)
     low, high = grid.points_m.min(axis=0), grid.points_m.max(axis=0)
     assert high - low == pytest.approx(np.array(box.extent_m))
-    # every side of a surface face is shared by two faces: no panel is cut otherwise than its neighbour
+    assert_closed(grid)
+
+
+def assert_closed(grid):
+    """Every side of a surface face is shared by two faces: no panel is cut otherwise than its neighbour."""
     rings = [face[face >= 0] for face in grid.faces]
     sides = np.concatenate([np.column_stack([ring, np.roll(ring, -1)]) for ring in rings])
     _, shared = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
     assert (shared == 2).all()
+
+
+@pytest.mark.parametrize("more_m", [(1e-7, 2e-7, 3e-7), (5e-7, 6e-7, 11e-7)])
+def test_sizes_to_a_tenth_of_a_micrometre_cut_no_edge(more_m):
+    # half of such a size is where rounding to tenths of a micrometre goes either way
+    pytest.importorskip("ngsolve", reason="ngsolve (extra housing) is not installed")
+    size_m = tuple(size + more for size, more in zip((0.45, 1.0, 0.9), more_m, strict=True))
+    assert_closed(box_grid(reference_box(size_m=size_m), 0.15))
+
+
+def test_a_band_without_natural_modes_is_stiff():
+    pytest.importorskip("ngsolve", reason="ngsolve (extra housing) is not installed")
+    box = small_box()
+    low = housing_modes(box, 5.0, edge_m=0.15, order=3)
+    assert low.natural == 0
+    # pushed up by its middle, all springs give way as one
+    springs = 4.0 * 2e7 + 2e7
+    forces = np.zeros((4, 3, 1))
+    forces[:, 2] = 0.25
+    moved = low.response([1e-3], forces)[:, 0] / (2e-3j * np.pi)
+    assert np.mean((low.seats[:, :, 2].T @ moved).real) == pytest.approx(1.0 / springs, rel=0.3)
 
 
 def test_without_ngsolve_the_error_says_what_to_install(monkeypatch):
@@ -202,5 +251,9 @@ def test_without_ngsolve_the_error_says_what_to_install(monkeypatch):
 
 
 def test_a_frequency_that_is_none_is_refused():
+    with pytest.raises(HousingError, match=r"edge_m must be > 0, got -0.1"):
+        housing_modes(small_box(), 100.0, edge_m=-0.1)
+    with pytest.raises(HousingError, match=r"order must be at least 2, got 1"):
+        housing_modes(small_box(), 100.0, order=1)
     with pytest.raises(HousingError, match=r"highest_hz must be > 0, got 0.0"):
         housing_modes(small_box(), 0.0)
