@@ -17,7 +17,7 @@ from tdacoustic.drive.housing_steps import (
 from tdacoustic.housing import HousingModes
 from tdacoustic.housing.solid_grid import PANELS
 from tdacoustic.housing.surface import panel_nodes
-from tdacoustic.radiation.transfer_vectors import transfer_band
+from tdacoustic.radiation.transfer_vectors import near_band, transfer_band
 
 HOUSING = """
 [housing]
@@ -80,14 +80,15 @@ def sound_of_made_up_modes(fleet, receivers=()):
     """The transfer vectors of these modes, through the functions of the steps."""
     tasks = housing_tasks(fleet, receivers)
     modes = modes_of(tasks.box, fleet.radiation.max_frequency_hz.value)
-    bands = {}
-    for number, task in enumerate(tasks.bands):
-        settings = task.settings
-        assert isinstance(settings, BandSettings)
-        bands[f"band_{number}"] = transfer_band(
-            settings.body, settings.band, lambda surface: panel_velocities(modes, surface, tasks.body.position_m)
-        )
+    bands, near = {}, {}
+    for held, made, solve in ((tasks.bands, bands, transfer_band), (tasks.near, near, near_band)):
+        for number, task in enumerate(held):
+            settings = task.settings
+            assert isinstance(settings, BandSettings)
+            made[f"{solve.__name__}_{number}"] = solve(
+                settings.body, settings.band, lambda surface: panel_velocities(modes, surface, tasks.body.position_m)
+            )
     mean, points = tasks.mean.settings, tasks.points.settings
     assert isinstance(mean, MeanSettings)
     assert isinstance(points, PointSettings)
-    return HousingSound(tasks.box, tasks.body, modes, _means(mean, **bands), _points(points, **bands))
+    return HousingSound(tasks.box, tasks.body, modes, _means(mean, **bands), _points(points, **bands, **near))

@@ -15,6 +15,7 @@ from tdacoustic.drive.prediction import (
     SpeedSweep,
 )
 from tdacoustic.drive.sources import SoundSource, StructureSource
+from tdacoustic.housing import HousingError
 
 __all__ = [
     "Condition",
@@ -24,6 +25,7 @@ __all__ = [
     "GearState",
     "GearUnit",
     "HelixCase",
+    "HousingError",
     "HousingFacts",
     "HousingField",
     "HousingSound",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from tdacoustic.drive.gear_unit import GearUnit
 from tdacoustic.drive.prediction import DriveSound, GearState, HelixCase
@@ -27,12 +27,41 @@ def gear_doubts(
             f"{1e-3 * least:.3g} N/mm), where ISO 6336-1 lowers the mesh stiffness in proportion; here it is not "
             "lowered"
         )
+    yield from structure_doubts(fleet, [(state.condition.name, state.mesh_hz) for state in states])
     by_text: dict[str, list[GearState]] = {}
     for state in (*states, *(case.gears for case in helix)):
         doubt = _doubt_of(state)
         if doubt is not None:
             by_text.setdefault(doubt, []).append(state)
     yield from (f"{_conditions(held)}: {doubt}" for doubt, held in by_text.items())
+
+
+def structure_doubts(fleet: Fleet, mesh_hz: Sequence[tuple[str, float]]) -> Iterator[str]:
+    """Yield what the path of the structure leaves out, where the total adds it.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    mesh_hz : sequence of (str, float)
+        Conditions and their mesh frequencies.
+    """
+    if fleet.radiation.method.value == "point_sources":
+        return
+    highest_hz = fleet.radiation.max_frequency_hz.value
+    silent = [name for name, frequency in mesh_hz if frequency > highest_hz]
+    if fleet.model.gear_path.value != "masuda" and silent:
+        yield (
+            f"condition{'s' if len(silent) > 1 else ''} {', '.join(silent)}: the mesh frequency lies above "
+            f"max_frequency_hz = {highest_hz:g}, so the structure has no sound there and the total lacks it"
+        )
+    elif fleet.model.gear_path.value != "masuda":
+        yield f"the structure's sound is that of the bearing forces' lines up to {highest_hz:g} Hz, and of none beyond"
+    later = len(fleet.gear_pair) - fleet.modelled_pair_number
+    if later % 2:
+        yield (
+            "the modelled pair is not the last stage: its wheel turns against the wheelset, and the bearing forces on "
+            "the housing are those of the other direction of travel"
+        )
 
 
 def _mode_doubts(fleet: Fleet, states: tuple[GearState, ...]) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
@@ -21,9 +22,6 @@ Point = tuple[float, float, float]
 
 ABOVE_TOP_M: Final = 0.1
 """Of the mesh's free source above the middle of the housing's top, where the fleet does not say [assumed]."""
-
-CLEAR_M: Final = 0.05
-"""Least distance of sources and receivers from the housing's walls: about a panel of the coarsest grid."""
 
 
 def ground_of(fleet: Fleet) -> float | None:
@@ -86,7 +84,8 @@ def _seats(fleet: Fleet, unit: GearUnit) -> tuple[Seat, Seat]:
     stated = [shaft for shaft in ("pinion", "wheel") if by_shaft[shaft][1].position_m is not None]
     if len(stated) == 1:
         raise FleetError(f"{fleet.path}: [[housing.seat]]: position_m is stated for the {stated[0]} alone")
-    defaults = dict(zip(("pinion", "wheel"), horizontal_centres(unit.geometry.centre_distance_m), strict=True))
+    apart_m = round(unit.geometry.centre_distance_m, 7)  # no step shall hang on the last bit of a geometry
+    defaults = dict(zip(("pinion", "wheel"), horizontal_centres(apart_m), strict=True))
     pinion, wheel = (_seat(fleet, *by_shaft[shaft], defaults[shaft]) for shaft in ("pinion", "wheel"))
     return pinion, wheel
 
@@ -119,7 +118,7 @@ def source_places(fleet: Fleet) -> SourcePlaces:
     assert fleet.housing is not None
     x, y, z = fleet.housing.position_m.value
     top = 0.5 * fleet.get("housing.size_m").value[2]
-    mesh = fleet.masuda.position_m
+    mesh = fleet.masuda.position_m if fleet.masuda.placement.value == "free" else None
     motor = fleet.motor
     sounds = motor is not None and any(
         e.sound_power_level_db is not None or e.flux_density_t is not None for e in motor.excitation
@@ -166,6 +165,9 @@ def body_of(fleet: Fleet, box: Box, receivers_m: Sequence[tuple[str, Point]] = (
         )
         for name, place in (*sources, *receivers_m):
             _outside(body, name, place)
+        for name, place in receivers_m:
+            if any(math.dist(place, source) < 1e-3 for source in body.sources_m):
+                raise RadiationError(f"{name} at {place} m is at a source of the model, where there is no level")
         return replace(body, near_m=tuple(sorted({place for _, place in receivers_m if body.is_near(place)})))
     except RadiationError as error:
         raise FleetError(f"{fleet.path}: [radiation]: {error}") from error
@@ -173,11 +175,11 @@ def body_of(fleet: Fleet, box: Box, receivers_m: Sequence[tuple[str, Point]] = (
 
 def _outside(body: BoxInAir, name: str, place: Point) -> None:
     apart = body.distance_m(place)
-    if apart < CLEAR_M:
+    if apart < body.clearance_m:
         where = "lies inside the housing" if apart <= 0.0 else f"is {1e3 * apart:.0f} mm from the housing's wall"
         raise RadiationError(
             f"{name} at {place} m {where}, which reaches over {body.reach}; boundary elements need it outside, "
-            f"{1e3 * CLEAR_M:.0f} mm off at least"
+            f"{1e3 * body.clearance_m:.0f} mm off at least"
         )
     if body.ground_m is not None and place[2] < body.ground_m:
         raise RadiationError(f"{name} at {place} m is below the ground at z = {body.ground_m:.4g} m")

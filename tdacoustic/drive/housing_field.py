@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from tdacoustic.drive.levels import PointField, Receiver
 from tdacoustic.drive.prediction import HousingFacts
 from tdacoustic.drive.sources import SoundSource, StructureSource
+from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces
 from tdacoustic.housing import Box, HousingModes, seat_loads
@@ -86,6 +87,7 @@ class HousingField(PointField):
     def __init__(self, fleet: Fleet, housing: HousingSound) -> None:
         super().__init__(fleet)
         self.housing = housing
+        self._path = fleet.path
         self.mesh_position_m = housing.body.sources_m[_MESH]
         self._loss_factor = fleet.number("housing.loss_factor")
         self._gain_db = fleet.model.structure_gain_db.value
@@ -141,15 +143,22 @@ class HousingField(PointField):
         """Return the level at receivers less the sound power level of a source, shape (receivers,)."""
         if not self.housing.reaches(source.frequency_hz):
             return super().transfer_db(source, receivers)
-        at_points = None
         found = np.empty(len(receivers))
+        placed, numbers = [], []
         for number, receiver in enumerate(receivers):
             if receiver.position_m is None:
                 moved = 20.0 * math.log10(self.surface.distance_m / receiver.distance_m)
                 found[number] = self._mean_db(source) + moved
                 continue
-            at_points = self._points_db(source) if at_points is None else at_points
-            found[number] = at_points[self.housing.places[receiver.position_m]]
+            if receiver.position_m not in self.housing.places:
+                raise FleetError(
+                    f"{self._path}: the transfer vectors of the housing have no receiver {receiver.name} at "
+                    f"{receiver.position_m} m"
+                )
+            placed.append(number)
+            numbers.append(self.housing.places[receiver.position_m])
+        if placed:
+            found[placed] = self._points_db(source, numbers)
         return found
 
     def _mean_db(self, source: SoundSource) -> float:
@@ -157,16 +166,16 @@ class HousingField(PointField):
         if isinstance(source, StructureSource) or source.path == "mesh":
             return self._surface_db
         square = self.housing.mean.of_source(source.frequency_hz, _MOTOR)
-        return 10.0 * math.log10(square) - _OF_1_PA_AT_1_M_DB
+        return float(_decibels(np.array(square))) - _OF_1_PA_AT_1_M_DB
 
-    def _points_db(self, source: SoundSource) -> Real:
-        """Levels at all points less the sound power level."""
+    def _points_db(self, source: SoundSource, numbers: Sequence[int]) -> Real:
+        """Levels at some points less the sound power level."""
         held = self.housing
         if isinstance(source, StructureSource):
-            squares = 0.5 * held.points.of_modes(source.frequency_hz, source.velocities)
+            squares = 0.5 * held.points.of_modes(source.frequency_hz, source.velocities, numbers)
             return _decibels(squares / _REFERENCE_PA**2) - source.sound_power_level_db
         number = _MESH if source.path == "mesh" else _MOTOR
-        squares = held.points.of_source(held.body, source.frequency_hz, number)
+        squares = held.points.of_source(held.body, source.frequency_hz, number, numbers)
         if number == _MOTOR:
             return _decibels(squares) - _OF_1_PA_AT_1_M_DB
         return _decibels(squares / held.mean.of_source(source.frequency_hz, _MESH)) + self._surface_db

@@ -1,7 +1,8 @@
 """Steps: modes of a housing, its transfer vectors, and what surfaces and receivers get of them.
 
-Modes depend on the housing alone, transfer vectors on the modes, the air, the places of the sources and of close
-receivers, and the last two steps on which receivers there are. None depends on speeds, torques, gears, forces or the
+Modes depend on the housing alone (its seats follow the gears' centre distance where the fleet does not place them),
+transfer vectors on the modes, the air, the ground and the places of the sources; close receivers have a step of their
+own, and the last two steps depend on which receivers there are. None depends on speeds, torques, forces or the
 housing's loss factor, so that all conditions share them.
 """
 
@@ -23,11 +24,26 @@ from tdacoustic.housing import Box, HousingModes, housing_modes
 from tdacoustic.radiation.box_in_air import BoxInAir
 from tdacoustic.radiation.received import MeanVectors, PointVectors, mean_vectors, point_vectors
 from tdacoustic.radiation.surfaces import Surface
-from tdacoustic.radiation.transfer_vectors import TransferBand, TransferNodes, bands_of, transfer_band
+from tdacoustic.radiation.transfer_vectors import (
+    NearNodes,
+    TransferBand,
+    TransferNodes,
+    bands_of,
+    near_band,
+    transfer_band,
+)
 from tdacoustic.steps import Step, Task
 from tdacoustic.steps.progress import tell_progress
 
-__all__ = ["HOUSING_MODES", "MEAN_VECTORS", "POINT_VECTORS", "TRANSFER_VECTORS", "HousingTasks", "housing_tasks"]
+__all__ = [
+    "HOUSING_MODES",
+    "MEAN_VECTORS",
+    "NEAR_VECTORS",
+    "POINT_VECTORS",
+    "TRANSFER_VECTORS",
+    "HousingTasks",
+    "housing_tasks",
+]
 
 Real = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -101,18 +117,28 @@ def _transfer(settings: BandSettings, modes: HousingModes) -> TransferNodes:
     return transfer_band(settings.body, settings.band, velocities_of, tell_progress)
 
 
+def _near(settings: BandSettings, modes: HousingModes) -> NearNodes:
+    def velocities_of(surface: Surface) -> Real:
+        return panel_velocities(modes, surface, settings.body.position_m)
+
+    return near_band(settings.body, settings.band, velocities_of, tell_progress)
+
+
 def _means(settings: MeanSettings, **bands: TransferNodes) -> MeanVectors:
     return mean_vectors(settings.body, list(bands.values()), settings.radius_m)
 
 
-def _points(settings: PointSettings, **bands: TransferNodes) -> PointVectors:
-    return point_vectors(settings.body, list(bands.values()), settings.points_m)
+def _points(settings: PointSettings, **bands: TransferNodes | NearNodes) -> PointVectors:
+    far = [band for band in bands.values() if isinstance(band, TransferNodes)]
+    near = [band for band in bands.values() if isinstance(band, NearNodes)]
+    return point_vectors(settings.body, far, settings.points_m, near)
 
 
 HOUSING_MODES: Final = Step("housing-modes", 1, _modes, "Modes of the housing by finite elements")
 TRANSFER_VECTORS: Final = Step(
     "transfer-vectors", 1, _transfer, "Sound of the housing's modes and of point sources by boundary elements"
 )
+NEAR_VECTORS: Final = Step("near-vectors", 1, _near, "Pressures close to the housing by boundary elements")
 MEAN_VECTORS: Final = Step("mean-vectors", 1, _means, "Means over the surface from transfer vectors")
 POINT_VECTORS: Final = Step("point-vectors", 1, _points, "Pressures at receivers from transfer vectors")
 
@@ -159,6 +185,8 @@ class HousingTasks:
     body : BoxInAir
     modes : Task
     bands : tuple of Task
+    near : tuple of Task
+        Of receivers close to the housing; none without such.
     mean : Task
     points : Task
         Around the circle first.
@@ -168,6 +196,7 @@ class HousingTasks:
     body: BoxInAir
     modes: Task
     bands: tuple[Task, ...]
+    near: tuple[Task, ...]
     mean: Task
     points: Task
 
@@ -196,18 +225,19 @@ def housing_tasks(fleet: Fleet, receivers: Sequence[Receiver] = ()) -> HousingTa
     pinion, wheel = (replace(seat, gear_y_m=0.0) for seat in box.seats)
     alike = replace(box, loss_factor=0.02, seats=(pinion, wheel))
     modes = HOUSING_MODES.task(f"up to {highest_hz:g} Hz", ModesSettings(alike, highest_hz))
+    radius_m = fleet.radiation.sphere_radius_m.value
+    alone = replace(body, near_m=())
     try:
-        bands = tuple(
-            TRANSFER_VECTORS.task(
-                f"{band.frequency_hz[0]:.0f} to {band.frequency_hz[-1]:.0f} Hz", BandSettings(body, band), modes=modes
-            )
-            for band in bands_of(body, highest_hz)
-        )
+        held = bands_of(body, highest_hz)
+        alone.check_sphere(radius_m)
     except RadiationError as error:
         raise FleetError(f"{fleet.path}: [radiation]: {error}") from error
+    bands = tuple(TRANSFER_VECTORS.task(_reach(band), BandSettings(alone, band), modes=modes) for band in held)
+    close = held if body.near_m else ()
+    near = tuple(NEAR_VECTORS.task(_reach(band), BandSettings(body, band), modes=modes) for band in close)
     inputs = {f"band_{number}": task for number, task in enumerate(bands)}
-    radius_m = fleet.radiation.sphere_radius_m.value
-    mean = MEAN_VECTORS.task(f"{radius_m:g} m", MeanSettings(body, radius_m), **inputs)
+    of_near = {f"near_{number}": task for number, task in enumerate(near)}
+    mean = MEAN_VECTORS.task(f"{radius_m:g} m", MeanSettings(alone, radius_m), **inputs)
     others = {r.position_m for r in placed if r.position_m is not None}
     points = (*(r.position_m for r in circle if r.position_m is not None), *sorted(others))
     return HousingTasks(
@@ -215,6 +245,11 @@ def housing_tasks(fleet: Fleet, receivers: Sequence[Receiver] = ()) -> HousingTa
         body,
         modes,
         bands,
+        near,
         mean,
-        POINT_VECTORS.task(f"{len(points)} receivers", PointSettings(body, points), **inputs),
+        POINT_VECTORS.task(f"{len(points)} receivers", PointSettings(body, points), **inputs, **of_near),
     )
+
+
+def _reach(band: TransferBand) -> str:
+    return f"{band.frequency_hz[0]:.0f} to {band.frequency_hz[-1]:.0f} Hz"

@@ -19,7 +19,7 @@ from tdacoustic.radiation.surfaces import Axis, Surface
 if TYPE_CHECKING:
     from tdacoustic.radiation.multipoles import Multipoles
 
-__all__ = ["LEAST_ELEMENTS_PER_WAVELENGTH", "BoxInAir"]
+__all__ = ["COARSEST_GRID_HZ", "LEAST_ELEMENTS_PER_WAVELENGTH", "BoxInAir"]
 
 Point = tuple[float, float, float]
 Complex = NDArray[np.complexfloating[Any, Any]]
@@ -30,6 +30,9 @@ _NEAR: Final = 1.5
 """Receivers nearer than this many radii of the enclosing sphere are computed without multipoles."""
 
 _MOST_BYTES: Final = 6e9
+
+COARSEST_GRID_HZ: Final = 1000.0
+"""Highest frequency of the coarsest grid, which carries all lower ones too, because it must resolve the modes."""
 
 
 @dataclass(frozen=True)
@@ -118,13 +121,7 @@ class BoxInAir:
         RadiationError
             It would take more memory than there may be.
         """
-        mirrors: tuple[Axis, ...] = ("x", "y", "z") if self.ground_m is None else ("x", "y")
-        largest = min(self.sound_speed_m_s / (self.elements_per_wavelength * grid_hz), min(self.extent_m) / 6.0)
-        panels = sum(
-            2.0 * math.ceil(one / largest) * math.ceil(other / largest)
-            for one, other in itertools.combinations(self.extent_m, 2)
-        )
-        needed = 16.0 * panels**2 / 2 ** len(mirrors)
+        panels, needed = self._panels(grid_hz), self.needed_bytes(grid_hz)
         if needed > _MOST_BYTES:
             raise RadiationError(
                 f"max_frequency_hz: {grid_hz:g} Hz with elements_per_wavelength = {self.elements_per_wavelength:g} "
@@ -132,7 +129,43 @@ class BoxInAir:
                 f"{1e-9 * _MOST_BYTES:.0f}; what the grid can carry ends at about "
                 f"{grid_hz * (_MOST_BYTES / needed) ** 0.25:.0f} Hz"
             )
-        return box_surface(self.extent_m, largest, mirrors, self.position_m)
+        return box_surface(self.extent_m, self._largest_panel_m(grid_hz), self._mirrors, self.position_m)
+
+    @property
+    def _mirrors(self) -> tuple[Axis, ...]:
+        return ("x", "y", "z") if self.ground_m is None else ("x", "y")
+
+    def _largest_panel_m(self, grid_hz: float) -> float:
+        return min(self.sound_speed_m_s / (self.elements_per_wavelength * grid_hz), min(self.extent_m) / 6.0)
+
+    def _panels(self, grid_hz: float) -> int:
+        largest = self._largest_panel_m(grid_hz)
+        pairs = itertools.combinations(self.extent_m, 2)
+        return sum(2 * math.ceil(one / largest) * math.ceil(other / largest) for one, other in pairs)
+
+    def needed_bytes(self, grid_hz: float) -> float:
+        """Return the memory that the systems of the grid for a frequency take, about."""
+        return 16.0 * float(self._panels(grid_hz)) ** 2 / 2 ** len(self._mirrors)
+
+    @property
+    def clearance_m(self) -> float:
+        """Least distance of sources and receivers from the walls: three quarters of a panel of the coarsest grid."""
+        return max(0.05, 1.1 * self._largest_panel_m(COARSEST_GRID_HZ))
+
+    def check_sphere(self, radius_m: float) -> None:
+        """Raise for a sphere around the drive's centre that does not enclose box and sources with room.
+
+        Raises
+        ------
+        RadiationError
+        """
+        farthest = max((math.dist(source, self.centre_m) for source in self.sources_m), default=0.0)
+        least = max(_NEAR * self.radius_m, 1.05 * farthest)
+        if radius_m < least:
+            raise RadiationError(
+                f"a sphere of {radius_m:g} m does not enclose the housing and the sources with room: it takes "
+                f"{least:.3g} m at least"
+            )
 
     def waves(self, frequency_hz: float) -> Multipoles:
         """Return the outgoing waves that carry the box's sound at a frequency."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -11,10 +10,9 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdacoustic.errors import RadiationError
 from tdacoustic.radiation.box_in_air import BoxInAir
 from tdacoustic.radiation.interpolation import lagrange, spread_nodes, weighted_sum
-from tdacoustic.radiation.transfer_vectors import TransferNodes
+from tdacoustic.radiation.transfer_vectors import NearNodes, TransferNodes
 
 __all__ = ["MeanVectors", "PointVectors", "mean_vectors", "point_vectors"]
 
@@ -87,32 +85,36 @@ class PointVectors:
     frequency_hz: Real
     columns: NDArray[np.complex64]
 
-    def of_modes(self, frequency_hz: float, velocities: Complex) -> Real:
-        """Return |p|² of modal velocities (modes,) at the points, in Pa²."""
+    def of_modes(self, frequency_hz: float, velocities: Complex, asked: Sequence[int] | None = None) -> Real:
+        """Return |p|² of modal velocities (modes,) at the points, or at those with the numbers asked for, in Pa²."""
         some, weights = lagrange(self.frequency_hz, frequency_hz)
         held = np.asarray(velocities, dtype=np.complex64)
-        pressures = self.columns[some, :, : len(held)] @ held
-        return np.asarray(np.abs(weights @ pressures) ** 2)
+        columns = self.columns[some] if asked is None else self.columns[some][:, list(asked)]
+        return np.asarray(np.abs(weights @ (columns[:, :, : len(held)] @ held)) ** 2)
 
-    def of_source(self, body: BoxInAir, frequency_hz: float, source: int) -> Real:
-        """Return |p|² of a source by its number, direct and scattered, at the points, in Pa²."""
+    def of_source(self, body: BoxInAir, frequency_hz: float, source: int, asked: Sequence[int] | None = None) -> Real:
+        """Return |p|² of a source by its number, direct and scattered, at the points or those asked for, in Pa²."""
         some, weights = lagrange(self.frequency_hz, frequency_hz)
+        numbers = list(range(len(self.points_m)) if asked is None else asked)
+        places = [self.points_m[number] for number in numbers]
         column = self.columns.shape[2] - len(body.sources_m) + source
-        scattered = weights @ self.columns[some, :, column] * _waves_back(body, frequency_hz, self.points_m).conj()
+        scattered = weights @ self.columns[some, :, column][:, numbers]
+        scattered = scattered * _waves_back(body, frequency_hz, places).conj()
         scattered = scattered / body.back_to_sources(frequency_hz)[source]
-        direct = body.direct(frequency_hz, self.points_m)[:, source]
+        direct = body.direct(frequency_hz, places)[:, source]
         return np.asarray(np.abs(direct + scattered) ** 2)
 
 
 class _Field:
     """The computed nodes of all bands as one field over frequency."""
 
-    def __init__(self, body: BoxInAir, parts: Sequence[TransferNodes]) -> None:
+    def __init__(self, body: BoxInAir, parts: Sequence[TransferNodes], near: Sequence[NearNodes] = ()) -> None:
         self.body = body
         held = sorted(parts, key=lambda part: part.frequency_hz[0])
         self.frequency_hz = np.array([f for part in held for f in part.frequency_hz])
         self.multipoles = [waves for part in held for waves in part.multipoles]
-        self.near = np.concatenate([part.near for part in held])
+        close = sorted(near, key=lambda part: part.frequency_hz[0])
+        self.near = np.concatenate([part.pressures for part in close]) if close else np.zeros((0, 0, 0))
 
     def multipoles_at(self, frequency_hz: float) -> Complex:
         """Return the multipoles of all columns at a frequency: (harmonics, columns)."""
@@ -135,7 +137,7 @@ def _waves_back(body: BoxInAir, frequency_hz: float, points_m: ArrayLike) -> Com
 
 
 def mean_vectors(body: BoxInAir, parts: Sequence[TransferNodes], radius_m: float) -> MeanVectors:
-    """Return the means over the sphere of a radius around the drive's centre.
+    """Return the means over the sphere of a radius around the drive's centre (over ground, the point below it).
 
     Parameters
     ----------
@@ -148,12 +150,7 @@ def mean_vectors(body: BoxInAir, parts: Sequence[TransferNodes], radius_m: float
     RadiationError
         The sphere does not enclose box and sources with room.
     """
-    farthest = max((math.dist(source, body.centre_m) for source in body.sources_m), default=0.0)
-    if not radius_m > max(body.radius_m, farthest):
-        raise RadiationError(
-            f"a sphere of {radius_m:g} m does not enclose the housing and the sources, which reach to "
-            f"{max(body.radius_m, farthest):.3g} m"
-        )
+    body.check_sphere(radius_m)
     field = _Field(body, parts)
     frequencies = spread_nodes(field.frequency_hz)
     modes = field.multipoles[0].shape[1] - len(body.sources_m)
@@ -171,7 +168,9 @@ def mean_vectors(body: BoxInAir, parts: Sequence[TransferNodes], radius_m: float
     return MeanVectors(radius_m, frequencies, modal, sources)
 
 
-def point_vectors(body: BoxInAir, parts: Sequence[TransferNodes], points_m: tuple[Point, ...]) -> PointVectors:
+def point_vectors(
+    body: BoxInAir, parts: Sequence[TransferNodes], points_m: tuple[Point, ...], near: Sequence[NearNodes] = ()
+) -> PointVectors:
     """Return the pressures at points.
 
     Parameters
@@ -180,11 +179,13 @@ def point_vectors(body: BoxInAir, parts: Sequence[TransferNodes], points_m: tupl
     parts : sequence of TransferNodes
     points_m : tuple of (float, float, float)
         Points for which `BoxInAir.is_near` holds must be among its `near_m`.
+    near : sequence of NearNodes
+        Of these.
     """
-    field = _Field(body, parts)
+    field = _Field(body, parts, near)
     frequencies = spread_nodes(field.frequency_hz)
     far = [number for number, point in enumerate(points_m) if not body.is_near(point)]
-    near = [(number, body.near_m.index(point)) for number, point in enumerate(points_m) if body.is_near(point)]
+    by_near = [(number, body.near_m.index(point)) for number, point in enumerate(points_m) if body.is_near(point)]
     places = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
     columns = np.empty((len(frequencies), len(points_m), field.multipoles[0].shape[1]), dtype=np.complex64)
     for number, frequency in enumerate(frequencies.tolist()):
@@ -192,8 +193,8 @@ def point_vectors(body: BoxInAir, parts: Sequence[TransferNodes], points_m: tupl
             back = _waves_back(body, frequency, places[far])
             waves = body.waves(frequency).at(places[far]).astype(np.complex64)
             columns[number, far] = (waves @ field.multipoles_at(frequency)) * back[:, None]
-        if near:
+        if by_near:
             close = field.near_at(frequency)
-            for here, there in near:
+            for here, there in by_near:
                 columns[number, here] = close[there]
     return PointVectors(points_m, frequencies, columns)

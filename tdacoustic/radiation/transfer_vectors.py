@@ -1,8 +1,8 @@
 """The sound of a box's vibrations and of point sources beside it, kept over frequency for any receiver.
 
 What is computed, node by node over frequency, are the multipoles (`multipoles`) of unit modal velocities and of the
-waves that the rigid box scatters; receivers inside the sphere where multipoles hold get their pressures directly. All
-else (means over spheres, directivities, microphones) follows without boundary elements.
+waves that the rigid box scatters; receivers too close for multipoles get their pressures directly, in a computation of
+their own. All else (means over spheres, directivities, microphones) follows without boundary elements.
 """
 
 from __future__ import annotations
@@ -11,23 +11,29 @@ import itertools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import RadiationError
-from tdacoustic.radiation.box_in_air import LEAST_ELEMENTS_PER_WAVELENGTH, BoxInAir
+from tdacoustic.radiation.box_in_air import COARSEST_GRID_HZ, LEAST_ELEMENTS_PER_WAVELENGTH, BoxInAir
 from tdacoustic.radiation.interpolation import frequency_nodes
 from tdacoustic.radiation.surfaces import Surface
 
+if TYPE_CHECKING:
+    from tdacoustic.radiation.boundary_elements import ExteriorProblem
+
 __all__ = [
     "LOWEST_HZ",
+    "NearNodes",
     "TransferBand",
     "TransferNodes",
     "bands_of",
     "frequencies_of",
     "grid_hz_for",
+    "near_band",
+    "outgoing_waves",
     "transfer_band",
 ]
 
@@ -35,8 +41,8 @@ Real = NDArray[np.float64]
 
 LOWEST_HZ: Final = 20.0
 
-GRID_LADDER_HZ: Final = (1000.0, 1300.0, 1600.0, 2000.0, 2500.0, 3000.0)
-"""Highest frequencies of grids; the first carries all lower frequencies too, because it must resolve the modes."""
+GRID_LADDER_HZ: Final = (COARSEST_GRID_HZ, 1300.0, 1600.0, 2000.0, 2500.0, 3000.0)
+"""Highest frequencies of grids."""
 
 _PHASE_STEP: Final = 1.25
 """Radians that the phase of the multipoles turns by, at most, from one frequency to the next."""
@@ -64,7 +70,7 @@ class TransferBand:
 
 @dataclass(frozen=True)
 class TransferNodes:
-    """Fields at some frequencies.
+    """Outgoing waves at some frequencies.
 
     Columns are unit modal velocities (m √kg / s), then unit sources (1 Pa at 1 m), of these what the box scatters,
     times `BoxInAir.back_to_sources`.
@@ -74,16 +80,28 @@ class TransferNodes:
     frequency_hz : tuple of float
     multipoles : tuple of ndarray of complex64, each of shape (harmonics, columns)
         As of `Multipoles`, which says how many there are.
-    near : ndarray of complex64, shape (frequencies, receivers, columns)
-        Pressures at the near receivers.
     panels : int
         Of the grid.
     """
 
     frequency_hz: tuple[float, ...]
     multipoles: tuple[NDArray[np.complex64], ...]
-    near: NDArray[np.complex64]
     panels: int
+
+
+@dataclass(frozen=True)
+class NearNodes:
+    """Pressures at near receivers at some frequencies.
+
+    Parameters
+    ----------
+    frequency_hz : tuple of float
+    pressures : ndarray of complex64, shape (frequencies, receivers, columns)
+        Columns as of `TransferNodes`.
+    """
+
+    frequency_hz: tuple[float, ...]
+    pressures: NDArray[np.complex64]
 
 
 def frequencies_of(body: BoxInAir, highest_hz: float) -> Real:
@@ -144,7 +162,7 @@ def transfer_band(
     velocities_of: Callable[[Surface], Real],
     done: Callable[[float], None] = lambda part: None,
 ) -> TransferNodes:
-    """Compute the fields of one band.
+    """Compute the outgoing waves of one band.
 
     Parameters
     ----------
@@ -157,32 +175,62 @@ def transfer_band(
     """
     surface = body.surface(band.grid_hz)
     velocities = np.asarray(velocities_of(surface), dtype=np.float32)
-    multipoles, near = [], []
+    found = []
     for number, frequency in enumerate(band.frequency_hz):
         done(number / len(band.frequency_hz))
-        outgoing, close = _at_frequency(body, surface, velocities, frequency)
-        multipoles.append(outgoing)
-        near.append(close)
-    return TransferNodes(band.frequency_hz, tuple(multipoles), np.stack(near), surface.n_panels)
+        found.append(outgoing_waves(body, surface, velocities, frequency))
+    return TransferNodes(band.frequency_hz, tuple(found), surface.n_panels)
 
 
-def _at_frequency(body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float) -> Any:
-    """Return the multipoles of all columns and their pressures at the near receivers."""
+def near_band(
+    body: BoxInAir,
+    band: TransferBand,
+    velocities_of: Callable[[Surface], Real],
+    done: Callable[[float], None] = lambda part: None,
+) -> NearNodes:
+    """Compute the pressures at the near receivers of one band; parameters as of `transfer_band`."""
+    surface = body.surface(band.grid_hz)
+    velocities = np.asarray(velocities_of(surface), dtype=np.float32)
+    found = []
+    for number, frequency in enumerate(band.frequency_hz):
+        done(number / len(band.frequency_hz))
+        problem = _problem(body, surface, frequency)
+        columns = [problem.transfer(body.near_m, velocities)]
+        if body.sources_m:
+            scattered = problem.scattered(body.sources_m, body.near_m) - body.direct(frequency, body.near_m)
+            columns.append(scattered * body.back_to_sources(frequency))
+        found.append(np.concatenate(columns, axis=1).astype(np.complex64))
+    return NearNodes(band.frequency_hz, np.stack(found))
+
+
+def outgoing_waves(
+    body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
+) -> NDArray[np.complex64]:
+    """Return the multipoles of all columns at a frequency: (harmonics, columns).
+
+    Parameters
+    ----------
+    body : BoxInAir
+    surface : Surface
+    velocities : ndarray, shape (panels, n)
+    frequency_hz : float
+    """
+    problem, waves = _problem(body, surface, frequency_hz), body.waves(frequency_hz)
+    found = [waves.of_surface(surface, problem.pressures(velocities), velocities, body.impedance_pa_s_m)]
+    if body.sources_m:
+        blocked = problem.blocked_pressures(body.sources_m)
+        scattered = waves.of_surface(surface, blocked, 0.0, body.impedance_pa_s_m)
+        found.append(scattered * body.back_to_sources(frequency_hz))
+    return np.concatenate(found, axis=1).astype(np.complex64)
+
+
+def _problem(body: BoxInAir, surface: Surface, frequency_hz: float) -> ExteriorProblem:
     from tdacoustic.radiation.boundary_elements import ExteriorProblem
 
-    wave, impedance = body.wave_number_rad_m(frequency_hz), body.impedance_pa_s_m
-    problem = ExteriorProblem(
-        surface, wave, impedance, body.ground_m, least_panels_per_wavelength=0.99 * LEAST_ELEMENTS_PER_WAVELENGTH
+    return ExteriorProblem(
+        surface,
+        body.wave_number_rad_m(frequency_hz),
+        body.impedance_pa_s_m,
+        body.ground_m,
+        least_panels_per_wavelength=0.99 * LEAST_ELEMENTS_PER_WAVELENGTH,
     )
-    waves = body.waves(frequency_hz)
-    found = [waves.of_surface(surface, problem.pressures(velocities), velocities, impedance)]
-    near = [problem.transfer(body.near_m, velocities)] if body.near_m else []
-    if body.sources_m:
-        back = body.back_to_sources(frequency_hz)
-        found.append(waves.of_surface(surface, problem.blocked_pressures(body.sources_m), 0.0, impedance) * back)
-        if body.near_m:
-            scattered = problem.scattered(body.sources_m, body.near_m) - body.direct(frequency_hz, body.near_m)
-            near.append(scattered * back)
-    columns = velocities.shape[1] + len(body.sources_m)
-    close = np.concatenate(near, axis=1) if near else np.zeros((0, columns))
-    return np.concatenate(found, axis=1).astype(np.complex64), close.astype(np.complex64)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tdacoustic.campaign import Campaign, load_campaign
-from tdacoustic.errors import CampaignError
+from tdacoustic.errors import CampaignError, FittingError
 from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
 from tdacoustic.workflows.runs import fleet_input, written_inputs
@@ -52,11 +52,13 @@ def calibrate(
     """
     from threadpoolctl import threadpool_limits
 
+    from tdacoustic.drive import gear_unit_of
+    from tdacoustic.drive.doubts import structure_doubts
     from tdacoustic.fitting.calibration import calibrate_fleet
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
     from tdacoustic.workflows.calibration_setup import candidates_of, fit_settings, free_parameters
-    from tdacoustic.workflows.housing_sound import housing_sound
+    from tdacoustic.workflows.housing_sound import checked_free, housing_sound
     from tdacoustic.workflows.joint_levels import joint_levels
     from tdacoustic.workflows.microphones import microphones
 
@@ -69,6 +71,10 @@ def calibrate(
         analysis = _analyzed(campaign, store, jobs, progress)
     joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
     free, transferred, earlier = free_parameters(campaign, fleet, joint.campaigns)
+    try:
+        checked_free(fleet, [parameter.name for parameter in free if parameter.expression is None])
+    except FittingError as error:
+        raise CampaignError(f"{campaign.path}: [calibration]: {error}") from error
     places = (*microphones(campaign, fleet).values(), *(datum.receiver for datum in joint.data))
     housing, records = housing_sound(fleet, store, jobs, progress, places)
     if progress is not None:
@@ -86,7 +92,10 @@ def calibrate(
             housing=housing,
         )
         over_speed = _over_speed(fleet, found, joint.data, housing)
-    doubts = (*joint.doubts, *_doubts_of_lines(analysis, joint.data), *found.doubts)
+    unit = gear_unit_of(fleet)
+    mesh_hz = {datum.condition.name: unit.mesh_hz(datum.condition.motor_hz) for datum in joint.data}
+    unheard = structure_doubts(fleet, list(mesh_hz.items()))
+    doubts = (*joint.doubts, *unheard, *_doubts_of_lines(analysis, joint.data), *found.doubts)
     found = replace(found, doubts=tuple(dict.fromkeys(doubts)))
     own = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
     prior_fleet = campaign.calibration.prior_fleet

@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
+from tdacoustic.errors import FleetError, RadiationError
 from tdacoustic.steps import Store
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
     from tdacoustic.drive import HousingSound, Receiver
+    from tdacoustic.drive.housing_steps import HousingTasks
     from tdacoustic.fleet import Fleet
     from tdacoustic.steps import Record
 
-__all__ = ["housing_sound"]
+__all__ = ["checked_free", "housing_sound"]
+
+_MOST_BYTES: Final = 12e9
+"""Memory that boundary elements in several processes may take together [assumed]."""
 
 
 def housing_sound(
@@ -43,15 +48,54 @@ def housing_sound(
     """
     if fleet.radiation.method.value == "point_sources":
         return None, ()
-    from tdacoustic.drive import HousingSound
+    from tdacoustic.drive import HousingError, HousingSound
     from tdacoustic.drive.housing_steps import housing_tasks
     from tdacoustic.steps import execute, lineage, result_of
 
     tasks = housing_tasks(fleet, receivers)
     wanted = [tasks.modes, tasks.mean, tasks.points]
-    outcome = execute(wanted, store, os.cpu_count() or 1 if jobs is None else jobs, progress)
+    outcome = execute(wanted, store, _jobs(tasks, fleet) if jobs is None else jobs, progress)
     for failure in outcome.failed.values():
+        if isinstance(failure, RadiationError | HousingError):
+            raise FleetError(f"{fleet.path}: [housing]: {failure}") from failure
         raise failure
     modes, mean, points = (result_of(task, store) for task in wanted)
     records = dict(pair for task in wanted for pair in lineage(task, store))
     return HousingSound(tasks.box, tasks.body, modes, mean, points), tuple(records.items())
+
+
+def _jobs(tasks: HousingTasks, fleet: Fleet) -> int:
+    """Processes, one a core, or fewer where their systems together would not fit into memory."""
+    needed = tasks.body.needed_bytes(fleet.radiation.max_frequency_hz.value)
+    return max(1, min(os.cpu_count() or 1, int(_MOST_BYTES // needed)))
+
+
+def checked_free(fleet: Fleet, names: Sequence[str]) -> None:
+    """Raise for parameters whose every value would ask for modes or transfer vectors of its own.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    names : sequence of str
+        Of parameters that a calibration is to move; those that are none of the fleet's are not looked at.
+
+    Raises
+    ------
+    FittingError
+    """
+    if fleet.radiation.method.value == "point_sources":
+        return
+    from tdacoustic.drive.housing_steps import housing_tasks
+    from tdacoustic.errors import FittingError
+
+    before = housing_tasks(fleet)
+    for name in names:
+        if "." not in name or "[" in name:
+            continue
+        value = fleet.value_of(name)
+        after = housing_tasks(fleet.replaced({name: 0.9999 * value if value else 1e-3}))
+        if (after.modes.key, after.mean.key) != (before.modes.key, before.mean.key):
+            raise FittingError(
+                f"{name} cannot be free with boundary elements: the housing's modes or transfer vectors depend on it, "
+                "and each value of it would take minutes"
+            )

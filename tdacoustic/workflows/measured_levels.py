@@ -117,7 +117,7 @@ def _recorded(
         yield surface_levels(usable, conditions)
     if "receivers" in data:
         yield receiver_levels(usable, conditions, microphones(usable.campaign, fleet))
-        yield [], list(microphone_doubts(usable.campaign))
+        yield [], list(microphone_doubts(usable.campaign, fleet))
     if "bands" in data:
         yield band_levels(usable, conditions, fleet.number("radiation.max_frequency_hz"))
     if "orders" in data:

@@ -35,6 +35,8 @@ def microphones(campaign: Campaign, fleet: Fleet) -> dict[str, Receiver]:
     fleet : Fleet
         For its wheel diameter and the ground of its space.
 
+    With boundary elements a microphone in the housing or at its walls is left out; `microphone_doubts` says so.
+
     Raises
     ------
     CampaignError
@@ -44,23 +46,44 @@ def microphones(campaign: Campaign, fleet: Fleet) -> dict[str, Receiver]:
     found = {}
     for channel in campaign.channels:
         receiver = _receiver(campaign, channel, fleet) if _is_microphone(channel) else None
-        if receiver is not None:
+        if receiver is not None and _too_close_m(receiver, fleet) is None:
             found[channel.name] = receiver
     return found
 
 
-def microphone_doubts(campaign: Campaign) -> tuple[str, ...]:
+def _too_close_m(receiver: Receiver, fleet: Fleet) -> tuple[float, float] | None:
+    """Distance from the housing's walls and the least that boundary elements take, where it is less."""
+    if receiver.position_m is None or fleet.radiation.method.value == "point_sources":
+        return None
+    from tdacoustic.drive import gear_unit_of
+    from tdacoustic.drive.housing_box import body_of, box_of
+
+    body = body_of(fleet, box_of(fleet, gear_unit_of(fleet)))
+    apart_m, least_m = body.distance_m(receiver.position_m), body.clearance_m
+    return (apart_m, least_m) if apart_m < least_m else None
+
+
+def microphone_doubts(campaign: Campaign, fleet: Fleet) -> tuple[str, ...]:
     """Return what campaigns say of a microphone's place that does not agree or cannot be used.
 
-    A ``position_m`` more than 10 % nearer or farther than ``distance_m`` (the position holds), and a ``side`` that is
-    neither left nor right.
+    A ``position_m`` more than 10 % nearer or farther than ``distance_m`` (the position holds), a ``side`` that is
+    neither left nor right, and with boundary elements a place in the housing or at its walls.
 
     Parameters
     ----------
     campaign : Campaign
+    fleet : Fleet
     """
     found = []
     for channel in filter(_is_microphone, campaign.channels):
+        receiver = _receiver(campaign, channel, fleet)
+        close = None if receiver is None else _too_close_m(receiver, fleet)
+        if close is not None:
+            where = "lies inside the housing" if close[0] <= 0.0 else f"is {1e3 * close[0]:.0f} mm from its wall"
+            found.append(
+                f"channel {channel.name} {where}: boundary elements take {1e3 * close[1]:.0f} mm at least, so the "
+                "model has no level there"
+            )
         if channel.position_m is not None and channel.distance_m is not None:
             distance_m = math.hypot(*channel.position_m)
             if abs(distance_m - channel.distance_m) > APART * max(distance_m, channel.distance_m):

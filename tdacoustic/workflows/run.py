@@ -121,7 +121,7 @@ def _predicted(
     conditions = {**conditions, **_more_conditions(fleet, conditions)}
     receivers = tuple(microphones(campaign, fleet).values())
     found = predict(fleet, store, progress, conditions.values(), receivers, jobs)
-    doubts = [*doubts, *microphone_doubts(campaign), *found.prediction.doubts]
+    doubts = [*doubts, *microphone_doubts(campaign, fleet), *found.prediction.doubts]
     return replace(found, prediction=replace(found.prediction, doubts=tuple(dict.fromkeys(doubts))))
 
 

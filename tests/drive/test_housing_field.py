@@ -187,7 +187,9 @@ def test_a_far_receiver_costs_no_boundary_elements(fleet):
     modes, bands, mean, points = keys_of(fleet)
     assert keys_of(fleet, (BESIDE, SOMEWHERE))[:3] == (modes, bands, mean)
     assert keys_of(fleet, (BESIDE,))[3] != points
-    assert keys_of(fleet, (CLOSE,))[1] != bands
+    assert keys_of(fleet, (CLOSE,))[:3] == (modes, bands, mean)
+    assert len(housing_tasks(fleet, (CLOSE,)).near) == len(bands)
+    assert not housing_tasks(fleet, (BESIDE,)).near
     moved = replace(BESIDE, name="the same place by another name")
     assert keys_of(fleet, (moved,)) == keys_of(fleet, (BESIDE,))
 

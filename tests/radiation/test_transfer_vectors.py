@@ -13,7 +13,7 @@ from tdacoustic.radiation.box_in_air import BoxInAir
 from tdacoustic.radiation.interpolation import frequency_nodes, lagrange, spread_nodes
 from tdacoustic.radiation.received import mean_vectors, point_vectors
 from tdacoustic.radiation.sphere_rules import SphereRule
-from tdacoustic.radiation.transfer_vectors import bands_of, frequencies_of, grid_hz_for, transfer_band
+from tdacoustic.radiation.transfer_vectors import bands_of, frequencies_of, grid_hz_for, near_band, transfer_band
 
 SPEED, IMPEDANCE = 343.0, 413.0
 SOURCES = ((0.0, 0.05, 0.4), (0.1, 0.6, 0.0))
@@ -52,7 +52,8 @@ def mean(body, parts):
 
 @pytest.fixture(scope="module")
 def points(body, parts):
-    return point_vectors(body, parts, (FAR, NEAR))
+    near = [near_band(body, band, shapes) for band in bands_of(body, HIGHEST_HZ)]
+    return point_vectors(body, parts, (FAR, NEAR), near)
 
 
 @pytest.mark.parametrize("frequency_hz", [23.0, 111.0, 333.0, 527.0, 693.0])
@@ -158,7 +159,7 @@ def test_what_is_refused(body, parts):
         bands_of(replace(body, extent_m=(1.0, 0.45, 0.9)), 9000.0)
     with pytest.raises(RadiationError, match="must be above 20 Hz"):
         frequencies_of(body, 15.0)
-    with pytest.raises(RadiationError, match="does not enclose the housing and the sources"):
+    with pytest.raises(RadiationError, match="does not enclose the housing and the sources with room: it takes"):
         mean_vectors(body, parts, 0.5)
 
 

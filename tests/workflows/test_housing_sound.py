@@ -7,6 +7,11 @@ from made_up_modes import HOUSING
 from plain_fleets import plain_fleet
 
 import tdacoustic as td
+from tdacoustic.campaign import load_campaign
+from tdacoustic.errors import FittingError
+from tdacoustic.fleet import load_fleet
+from tdacoustic.workflows.housing_sound import checked_free
+from tdacoustic.workflows.microphones import microphone_doubts, microphones
 
 MOTOR = """
 [motor]
@@ -136,3 +141,61 @@ def test_without_ngsolve_the_extra_is_named(call_program, tmp_path, monkeypatch)
     code, _, err = call_program("predict", fleet, "-o", tmp_path / "out", "--store", tmp_path / "store")
     assert code == 1
     assert "tdacoustic[housing]" in err
+
+
+@pytest.mark.parametrize(
+    ("key", "message"),
+    [
+        ("housing.wall_mm", "housing.wall_mm cannot be free with boundary elements"),
+        ("housing.seat.2.radius_m", "housing.seat.2.radius_m cannot be free"),
+        ("radiation.temperature_degc", "radiation.temperature_degc cannot be free"),
+        ("housing.loss_factor", None),
+        ("model.structure_gain_db", None),
+        ("train.wheel_diameter_mm", None),
+    ],
+)
+def test_what_would_take_minutes_for_each_value_is_refused_at_once(tmp_path, key, message):
+    fleet = load_fleet(small_fleet(tmp_path / "drive"))
+    if message is None:
+        checked_free(fleet, [key])
+        return
+    with pytest.raises(FittingError, match=message):
+        checked_free(fleet, [key])
+
+
+def test_where_the_ground_or_the_seats_follow_a_parameter_it_cannot_be_free(tmp_path):
+    seats = {"position_m = [-0.1, 0.0, 0.0]\n": "", "position_m = [0.1, 0.0, 0.0]\n": ""}
+    big = {"size_m = [0.2, 0.5, 0.4]": "size_m = [0.2, 0.9, 0.4]"}
+    fleet = load_fleet(small_fleet(tmp_path / "drive", **seats, **big))
+    with pytest.raises(FittingError, match=r"gear_pair\.1\.centre_distance_mm cannot be free"):
+        checked_free(fleet, ["gear_pair.1.centre_distance_mm"])
+    half = load_fleet(small_fleet(tmp_path / "half", **{"[radiation]": '[radiation]\nspace = "half"'}))
+    with pytest.raises(FittingError, match=r"train\.wheel_diameter_mm cannot be free"):
+        checked_free(half, ["train.wheel_diameter_mm"])
+
+
+def test_a_microphone_at_the_wall_is_left_out_and_said(tmp_path):
+    fleet = load_fleet(small_fleet(tmp_path / "drive"))
+    mic = '[[channel]]\nname = "{}"\nquantity = "sound_pressure"\nposition_m = [0.0, {}, 0.0]\n'
+    campaign = tmp_path / "campaign.toml"
+    campaign.write_text(
+        'schema = "tdacoustic-campaign/1"\norigin = "measured"\nfleet = "drive/fleet.toml"\n'
+        + mic.format("far", 4.0)
+        + mic.format("wall", 0.11)
+        + mic.format("oil", 0.05)
+        + '[[level]]\ncondition = "1"\ndistance_m = 4.0\nlevel_db = 80.0\n',
+        encoding="utf-8",
+    )
+    loaded = load_campaign(campaign)
+    assert set(microphones(loaded, fleet)) == {"far"}
+    doubts = microphone_doubts(loaded, fleet)
+    assert any("channel wall is 10 mm from its wall" in doubt for doubt in doubts)
+    assert any("channel oil lies inside the housing" in doubt for doubt in doubts)
+
+
+def test_a_sphere_too_small_is_refused_before_anything_is_computed(call_program, tmp_path):
+    fleet = small_fleet(tmp_path / "drive", **{"sphere_radius_m = { value = 4,": "sphere_radius_m = { value = 0.4,"})
+    code, _, err = call_program("predict", fleet, "-o", tmp_path / "out", "--store", tmp_path / "store")
+    assert code == 1
+    assert "a sphere of 0.4 m does not enclose the housing and the sources with room" in err
+    assert str(fleet) in err

@@ -56,7 +56,7 @@ def test_places(tmp_path):
     assert {found["m1"].distance_m, found["m2"].distance_m} == {5.0}
     assert set(found) == {"m0", "m1", "m2", "m3", "m4", "m7", "m8"}
     assert all(receiver.name == name for name, receiver in found.items())
-    assert microphone_doubts(campaign) == ()
+    assert microphone_doubts(campaign, load_fleet(REFERENCE)) == ()
 
 
 @pytest.mark.parametrize(
@@ -94,7 +94,7 @@ def test_what_does_not_agree_is_said(tmp_path):
         mic(position_m=[0.0, 3.9, 0.0], distance_m=4.0),
         mic(distance_m=4.0, height_above_rail_m=1.2, side="platform"),
     )
-    first, second = microphone_doubts(campaign)
+    first, second = microphone_doubts(campaign, load_fleet(REFERENCE))
     assert first == (
         "channel m0: position_m is 3 m from the drive's centre, distance_m says 4 m; its place in the model is the "
         "position"
