@@ -13,7 +13,7 @@ import pytest
 from hypothesis import settings
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")
-sys.path.insert(0, str(Path(__file__).parent))  # for plain_fleets and made_up_modes
+sys.path.insert(0, str(Path(__file__).parent))  # for plain_fleets, made_up_modes, studies
 
 # The same examples in every run, so that a run tells of the change and not of the dice; HYPOTHESIS_PROFILE=search
 # looks for new ones.

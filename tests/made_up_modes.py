@@ -3,6 +3,7 @@
 import math
 
 import numpy as np
+from plain_fleets import plain_fleet
 
 from tdacoustic.drive import HousingSound
 from tdacoustic.drive.housing_steps import (
@@ -39,6 +40,14 @@ position_m = [0.1, 0.0, 0.0]
 radius_m = 0.08
 thickness_mm = 30
 """
+
+
+def fleet_text(motor, highest_hz):
+    """The reference drive with boundary elements, this small housing and another motor."""
+    whole = plain_fleet("reference-drive").read_text(encoding="utf-8")
+    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
+    text = (whole[:start] + motor + HOUSING + whole[end:]).replace("= 3000", f"= {highest_hz}")
+    return text.replace("point_sources", "boundary_elements")
 
 
 def triangles_of(extent_m, cells=8):

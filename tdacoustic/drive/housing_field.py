@@ -16,7 +16,9 @@ from tdacoustic.drive.sources import SoundSource, StructureSource
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces
+from tdacoustic.gears.masuda import SPHERE_OF_1_M_DB
 from tdacoustic.housing import Box, HousingModes, seat_loads
+from tdacoustic.radiation import mean_over_sphere_db
 from tdacoustic.radiation.box_in_air import BoxInAir
 from tdacoustic.radiation.received import MeanVectors, PointVectors
 
@@ -28,9 +30,6 @@ Point = tuple[float, float, float]
 _REFERENCE_PA = 2e-5
 _MESH, _MOTOR = 0, 1
 """Numbers of the sources in transfer vectors."""
-
-_OF_1_PA_AT_1_M_DB = 10.0 * math.log10(4.0 * math.pi)
-"""Sound power level, less its level at 1 m, of a point source."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +90,7 @@ class HousingField(PointField):
         self.mesh_position_m = housing.body.sources_m[_MESH]
         self._loss_factor = fleet.number("housing.loss_factor")
         self._gain_db = fleet.model.structure_gain_db.value
-        self._surface_db = super()._free_db(SoundSource("mesh", "", 1.0, 0.0), self.surface)
+        self._surface_db = mean_over_sphere_db(self.surface.distance_m, self._space)
 
     @property
     def facts(self) -> HousingFacts:
@@ -166,7 +165,7 @@ class HousingField(PointField):
         if isinstance(source, StructureSource) or source.path == "mesh":
             return self._surface_db
         square = self.housing.mean.of_source(source.frequency_hz, _MOTOR)
-        return float(_decibels(np.array(square))) - _OF_1_PA_AT_1_M_DB
+        return float(_decibels(np.array(square))) - SPHERE_OF_1_M_DB
 
     def _points_db(self, source: SoundSource, numbers: Sequence[int]) -> Real:
         """Levels at some points less the sound power level."""
@@ -177,7 +176,7 @@ class HousingField(PointField):
         number = _MESH if source.path == "mesh" else _MOTOR
         squares = held.points.of_source(held.body, source.frequency_hz, number, numbers)
         if number == _MOTOR:
-            return _decibels(squares) - _OF_1_PA_AT_1_M_DB
+            return _decibels(squares) - SPHERE_OF_1_M_DB
         return _decibels(squares / held.mean.of_source(source.frequency_hz, _MESH)) + self._surface_db
 
     def doubts(self, sources: Sequence[SoundSource]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Final
 
 import numpy as np
@@ -111,16 +112,12 @@ def _modes(settings: ModesSettings) -> HousingModes:
 
 
 def _transfer(settings: BandSettings, modes: HousingModes) -> TransferNodes:
-    def velocities_of(surface: Surface) -> Real:
-        return panel_velocities(modes, surface, settings.body.position_m)
-
+    velocities_of = partial(panel_velocities, modes, position_m=settings.body.position_m)
     return transfer_band(settings.body, settings.band, velocities_of, tell_progress)
 
 
 def _near(settings: BandSettings, modes: HousingModes) -> NearNodes:
-    def velocities_of(surface: Surface) -> Real:
-        return panel_velocities(modes, surface, settings.body.position_m)
-
+    velocities_of = partial(panel_velocities, modes, position_m=settings.body.position_m)
     return near_band(settings.body, settings.band, velocities_of, tell_progress)
 
 

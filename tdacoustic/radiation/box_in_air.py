@@ -121,6 +121,16 @@ class BoxInAir:
         RadiationError
             It would take more memory than there may be.
         """
+        self.check_grid(grid_hz)
+        return box_surface(self.extent_m, self._largest_panel_m(grid_hz), self._mirrors, self.position_m)
+
+    def check_grid(self, grid_hz: float) -> None:
+        """Raise for a grid that would take more memory than there may be.
+
+        Raises
+        ------
+        RadiationError
+        """
         panels, needed = self._panels(grid_hz), self.needed_bytes(grid_hz)
         if needed > _MOST_BYTES:
             raise RadiationError(
@@ -129,7 +139,6 @@ class BoxInAir:
                 f"{1e-9 * _MOST_BYTES:.0f}; what the grid can carry ends at about "
                 f"{grid_hz * (_MOST_BYTES / needed) ** 0.25:.0f} Hz"
             )
-        return box_surface(self.extent_m, self._largest_panel_m(grid_hz), self._mirrors, self.position_m)
 
     @property
     def _mirrors(self) -> tuple[Axis, ...]:

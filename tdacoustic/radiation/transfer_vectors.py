@@ -38,6 +38,8 @@ __all__ = [
 ]
 
 Real = NDArray[np.float64]
+Velocities = Callable[[Surface], Real]
+Done = Callable[[float], None]
 
 LOWEST_HZ: Final = 20.0
 
@@ -52,6 +54,10 @@ _DENSE: Final = 13.0
 
 _AT_ONCE: Final = 8
 """Frequencies of one task at most; tasks run side by side and are kept one by one."""
+
+
+def _silent(part_done: float) -> None:
+    """Nobody listens."""
 
 
 @dataclass(frozen=True)
@@ -152,16 +158,11 @@ def bands_of(body: BoxInAir, highest_hz: float) -> tuple[TransferBand, ...]:
         some = list(held)
         count = math.ceil(len(some) / _AT_ONCE)
         found += [TransferBand(tuple(part.tolist()), grid_hz) for part in np.array_split(some, count)]
-    body.surface(found[-1].grid_hz)
+    body.check_grid(found[-1].grid_hz)
     return tuple(found)
 
 
-def transfer_band(
-    body: BoxInAir,
-    band: TransferBand,
-    velocities_of: Callable[[Surface], Real],
-    done: Callable[[float], None] = lambda part: None,
-) -> TransferNodes:
+def transfer_band(body: BoxInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent) -> TransferNodes:
     """Compute the outgoing waves of one band.
 
     Parameters
@@ -173,34 +174,42 @@ def transfer_band(
     done : callable
         Told now and then which part is done.
     """
-    surface = body.surface(band.grid_hz)
-    velocities = np.asarray(velocities_of(surface), dtype=np.float32)
-    found = []
-    for number, frequency in enumerate(band.frequency_hz):
-        done(number / len(band.frequency_hz))
-        found.append(outgoing_waves(body, surface, velocities, frequency))
-    return TransferNodes(band.frequency_hz, tuple(found), surface.n_panels)
+    found = _over(outgoing_waves, body, band, velocities_of, done)
+    return TransferNodes(band.frequency_hz, tuple(found), body.surface(band.grid_hz).n_panels)
 
 
-def near_band(
+def near_band(body: BoxInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent) -> NearNodes:
+    """Compute the pressures at the near receivers of one band; parameters as of `transfer_band`."""
+    return NearNodes(band.frequency_hz, np.stack(_over(_near_pressures, body, band, velocities_of, done)))
+
+
+def _over(
+    solve: Callable[[BoxInAir, Surface, NDArray[Any], float], NDArray[np.complex64]],
     body: BoxInAir,
     band: TransferBand,
-    velocities_of: Callable[[Surface], Real],
-    done: Callable[[float], None] = lambda part: None,
-) -> NearNodes:
-    """Compute the pressures at the near receivers of one band; parameters as of `transfer_band`."""
+    velocities_of: Velocities,
+    done: Done,
+) -> list[NDArray[np.complex64]]:
+    """Return what one frequency after the other gives on the grid of a band."""
     surface = body.surface(band.grid_hz)
     velocities = np.asarray(velocities_of(surface), dtype=np.float32)
     found = []
     for number, frequency in enumerate(band.frequency_hz):
         done(number / len(band.frequency_hz))
-        problem = _problem(body, surface, frequency)
-        columns = [problem.transfer(body.near_m, velocities)]
-        if body.sources_m:
-            scattered = problem.scattered(body.sources_m, body.near_m) - body.direct(frequency, body.near_m)
-            columns.append(scattered * body.back_to_sources(frequency))
-        found.append(np.concatenate(columns, axis=1).astype(np.complex64))
-    return NearNodes(band.frequency_hz, np.stack(found))
+        found.append(solve(body, surface, velocities, frequency))
+    return found
+
+
+def _near_pressures(
+    body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
+) -> NDArray[np.complex64]:
+    """Return the pressures of all columns at the near receivers at a frequency: (receivers, columns)."""
+    problem = _problem(body, surface, frequency_hz)
+    columns = [problem.transfer(body.near_m, velocities)]
+    if body.sources_m:
+        scattered = problem.scattered(body.sources_m, body.near_m) - body.direct(frequency_hz, body.near_m)
+        columns.append(scattered * body.back_to_sources(frequency_hz))
+    return np.concatenate(columns, axis=1).astype(np.complex64)
 
 
 def outgoing_waves(

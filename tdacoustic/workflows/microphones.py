@@ -10,6 +10,7 @@ from tdacoustic.errors import CampaignError
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign, CampaignChannel
     from tdacoustic.drive import Receiver
+    from tdacoustic.drive.housing_box import BoxInAir
     from tdacoustic.fleet import Fleet
 
 __all__ = ["microphone_doubts", "microphones"]
@@ -27,15 +28,14 @@ def microphones(campaign: Campaign, fleet: Fleet) -> dict[str, Receiver]:
     A place is ``position_m``; else what ``distance_m``, ``height_above_rail_m`` and ``side`` (``"left"`` or
     ``"right"``) give together: x = 0, z the height less half a wheel diameter (the drive's centre lies at the height
     of the wheel's, as the ground of `tdacoustic.drive.PointField`), y what remains of the distance; else the distance
-    alone, without direction.
+    alone, without direction. With boundary elements a microphone in the housing or at its walls is left out;
+    `microphone_doubts` says so.
 
     Parameters
     ----------
     campaign : Campaign
     fleet : Fleet
-        For its wheel diameter and the ground of its space.
-
-    With boundary elements a microphone in the housing or at its walls is left out; `microphone_doubts` says so.
+        For its wheel diameter, the ground of its space and its housing.
 
     Raises
     ------
@@ -43,24 +43,29 @@ def microphones(campaign: Campaign, fleet: Fleet) -> dict[str, Receiver]:
         A place that cannot be: higher than it is far, at the drive's centre itself, or below the rail where
         ``[radiation] space`` has its ground there.
     """
-    found = {}
+    found, housing = {}, _housing_of(fleet)
     for channel in campaign.channels:
         receiver = _receiver(campaign, channel, fleet) if _is_microphone(channel) else None
-        if receiver is not None and _too_close_m(receiver, fleet) is None:
+        if receiver is not None and not _too_close(receiver, housing):
             found[channel.name] = receiver
     return found
 
 
-def _too_close_m(receiver: Receiver, fleet: Fleet) -> tuple[float, float] | None:
-    """Distance from the housing's walls and the least that boundary elements take, where it is less."""
-    if receiver.position_m is None or fleet.radiation.method.value == "point_sources":
+def _housing_of(fleet: Fleet) -> BoxInAir | None:
+    """The housing that receivers must keep off; None of point sources."""
+    if fleet.radiation.method.value == "point_sources":
         return None
     from tdacoustic.drive import gear_unit_of
     from tdacoustic.drive.housing_box import body_of, box_of
 
-    body = body_of(fleet, box_of(fleet, gear_unit_of(fleet)))
-    apart_m, least_m = body.distance_m(receiver.position_m), body.clearance_m
-    return (apart_m, least_m) if apart_m < least_m else None
+    return body_of(fleet, box_of(fleet, gear_unit_of(fleet)))
+
+
+def _too_close(receiver: Receiver, housing: BoxInAir | None) -> bool:
+    """Whether boundary elements take no receiver there."""
+    if housing is None or receiver.position_m is None:
+        return False
+    return housing.distance_m(receiver.position_m) < housing.clearance_m
 
 
 def microphone_doubts(campaign: Campaign, fleet: Fleet) -> tuple[str, ...]:
@@ -74,15 +79,16 @@ def microphone_doubts(campaign: Campaign, fleet: Fleet) -> tuple[str, ...]:
     campaign : Campaign
     fleet : Fleet
     """
-    found = []
+    found, housing = [], _housing_of(fleet)
     for channel in filter(_is_microphone, campaign.channels):
         receiver = _receiver(campaign, channel, fleet)
-        close = None if receiver is None else _too_close_m(receiver, fleet)
-        if close is not None:
-            where = "lies inside the housing" if close[0] <= 0.0 else f"is {1e3 * close[0]:.0f} mm from its wall"
+        if receiver is not None and housing is not None and _too_close(receiver, housing):
+            assert receiver.position_m is not None
+            apart_m = housing.distance_m(receiver.position_m)
+            where = "lies inside the housing" if apart_m <= 0.0 else f"is {1e3 * apart_m:.0f} mm from its wall"
             found.append(
-                f"channel {channel.name} {where}: boundary elements take {1e3 * close[1]:.0f} mm at least, so the "
-                "model has no level there"
+                f"channel {channel.name} {where}: boundary elements take {1e3 * housing.clearance_m:.0f} mm at least, "
+                "so the model has no level there"
             )
         if channel.position_m is not None and channel.distance_m is not None:
             distance_m = math.hypot(*channel.position_m)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_modes import HOUSING, modes_of, sound_of_made_up_modes
+from made_up_modes import fleet_text, modes_of, sound_of_made_up_modes
 
 import tdacoustic as td
 from tdacoustic.drive import DriveModel, Receiver
@@ -32,11 +32,8 @@ SOMEWHERE = Receiver("8 m", 8.0)
 
 
 @pytest.fixture(scope="module")
-def text(reference):
-    whole = reference.path.read_text(encoding="utf-8")
-    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
-    text = (whole[:start] + MOTOR + HOUSING + whole[end:]).replace("= 3000", "= 700")
-    return text.replace("point_sources", "boundary_elements")
+def text():
+    return fleet_text(MOTOR, 700)
 
 
 @pytest.fixture(scope="module")

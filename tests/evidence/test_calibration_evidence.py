@@ -3,11 +3,11 @@
 import ast
 import json
 import math
-import sys
 from pathlib import Path
 
 import pytest
 from scipy.stats import binomtest
+from studies import study_module
 
 HERE = Path(__file__).parent
 RERUN = (
@@ -19,16 +19,8 @@ CHANCE = 1e-4
 
 @pytest.fixture(scope="module")
 def study():
-    """The study's modules, which stand outside of any package."""
-    folders = [str(HERE), str(HERE.parent / "gears")]
-    sys.path[:0] = folders
-    try:
-        import calibration_study
-
-        yield calibration_study
-    finally:
-        for folder in folders:
-            sys.path.remove(folder)
+    with study_module("calibration_study", "gears") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

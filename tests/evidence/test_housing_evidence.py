@@ -1,10 +1,10 @@
 """The housing study: whether its record is of these sources, and what it must hold."""
 
 import ast
-import sys
 from pathlib import Path
 
 import pytest
+from studies import study_module
 
 HERE = Path(__file__).parent
 RERUN = "python tests/evidence/run_housing_study.py"
@@ -12,16 +12,8 @@ RERUN = "python tests/evidence/run_housing_study.py"
 
 @pytest.fixture(scope="module")
 def study():
-    """The study's module, which stands outside of any package."""
-    folders = [str(HERE), str(HERE.parent / "housing")]
-    sys.path[:0] = folders
-    try:
-        import housing_study
-
-        yield housing_study
-    finally:
-        for folder in folders:
-            sys.path.remove(folder)
+    with study_module("housing_study", "housing") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

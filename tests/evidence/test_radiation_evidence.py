@@ -1,11 +1,11 @@
 """The radiation study: what its record must hold, whether it is of these sources, and some of its rows again."""
 
 import ast
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from studies import study_module
 
 HERE = Path(__file__).parent
 RERUN = "python tests/evidence/run_radiation_study.py"
@@ -13,14 +13,8 @@ RERUN = "python tests/evidence/run_radiation_study.py"
 
 @pytest.fixture(scope="module")
 def study():
-    """The study's modules, which stand outside of any package."""
-    sys.path.insert(0, str(HERE))
-    try:
-        import radiation_study
-
-        yield radiation_study
-    finally:
-        sys.path.remove(str(HERE))
+    with study_module("radiation_study") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

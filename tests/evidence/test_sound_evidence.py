@@ -1,10 +1,10 @@
 """The study of the drive's sound: whether its record is of these sources, and what it must hold."""
 
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from studies import study_module
 
 HERE = Path(__file__).parent
 RERUN = "python tests/evidence/sound_study.py"
@@ -12,13 +12,8 @@ RERUN = "python tests/evidence/sound_study.py"
 
 @pytest.fixture(scope="module")
 def study():
-    sys.path.insert(0, str(HERE))
-    try:
-        import sound_study
-
-        yield sound_study
-    finally:
-        sys.path.remove(str(HERE))
+    with study_module("sound_study") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_up_modes import HOUSING, sound_of_made_up_modes
-from plain_fleets import plain_fleet
+from made_up_modes import fleet_text, sound_of_made_up_modes
 
 import tdacoustic as td
 from tdacoustic.drive import DriveModel, Receiver
@@ -24,14 +23,10 @@ PLACES = (Receiver("4 m", 4.0), Receiver("beside", 4.0, (0.0, 4.0, 0.0)), Receiv
 
 @pytest.fixture(scope="module")
 def fleet(tmp_path_factory):
-    whole = plain_fleet("reference-drive").read_text(encoding="utf-8")
-    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
-    text = (whole[:start] + HOUSING + whole[end:]).replace("= 3000", "= 700")
     path = tmp_path_factory.mktemp("fleet") / "fleet.toml"
-    path.write_text(text, encoding="utf-8")
+    path.write_text(fleet_text("", 700), encoding="utf-8")
     speeds = {"operation.train_speed_km_h": SPEEDS, "operation.helix_angle_deg": (4.0,)}
-    changes = {"radiation.method": "boundary_elements", "model.gear_path": "structure"}
-    return td.load_fleet(path).replaced(speeds | changes)
+    return td.load_fleet(path).replaced(speeds | {"model.gear_path": "structure"})
 
 
 @pytest.fixture(scope="module")

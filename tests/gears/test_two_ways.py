@@ -4,10 +4,10 @@ Machinery and protocol are in tests/evidence/gear_motions.py.
 """
 
 import json
-import sys
 from pathlib import Path
 
 import pytest
+from studies import study_module
 
 EVIDENCE = Path(__file__).resolve().parents[1] / "evidence"
 CONDITIONS = {"all loads": range(16), "light loads": range(8)}
@@ -16,14 +16,8 @@ RERUN = "python tests/evidence/run_gear_study.py --record tests/evidence/gear_re
 
 @pytest.fixture(scope="module")
 def motions():
-    """The study's module, which stands outside of any package."""
-    sys.path.insert(0, str(EVIDENCE))
-    try:
-        import gear_motions
-
-        yield gear_motions
-    finally:
-        sys.path.remove(str(EVIDENCE))
+    with study_module("gear_motions") as module:
+        yield module
 
 
 @pytest.fixture(scope="module")

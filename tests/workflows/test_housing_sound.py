@@ -3,8 +3,7 @@
 import numpy as np
 import pandas as pd
 import pytest
-from made_up_modes import HOUSING
-from plain_fleets import plain_fleet
+from made_up_modes import fleet_text
 
 import tdacoustic as td
 from tdacoustic.campaign import load_campaign
@@ -24,10 +23,7 @@ sound_power_level_db = 90
 
 
 def small_fleet(folder, **replacements):
-    whole = plain_fleet("reference-drive").read_text(encoding="utf-8")
-    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
-    text = (whole[:start] + MOTOR + HOUSING + whole[end:]).replace("= 3000", "= 400")
-    text = text.replace("point_sources", "boundary_elements").replace("[20, 30, 40, 50, 60, 114.455]", "[20, 30, 40]")
+    text = fleet_text(MOTOR, 400).replace("[20, 30, 40, 50, 60, 114.455]", "[20, 30, 40]")
     for old, new in replacements.items():
         assert old in text
         text = text.replace(old, new, 1)
