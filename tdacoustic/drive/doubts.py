@@ -8,6 +8,7 @@ from tdacoustic.drive.gear_unit import GearUnit
 from tdacoustic.drive.prediction import DriveSound, GearState, HelixCase
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
+from tdacoustic.radiation import ABSORPTION_RANGE
 
 __all__ = ["gear_doubts", "sound_doubts"]
 
@@ -98,8 +99,7 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
         )
     if placement == "off":
         yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
-    if fleet.radiation.air_absorption.value:
-        yield "air_absorption is asked for and is not computed: levels are those of air that absorbs nothing"
+    yield from _air_doubts(fleet)
     if unknown:
         yield (
             f"excitation{'s' if len(unknown) > 1 else ''} {', '.join(unknown)} of the motor: neither flux "
@@ -107,6 +107,17 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
         )
     if not any(s.path == "motor" for one in sound for s in one.sources):
         yield "the motor makes no sound in this model: the levels are those of the gears alone"
+
+
+def _air_doubts(fleet: Fleet) -> Iterator[str]:
+    radiation = fleet.radiation
+    (coldest, hottest), (driest, _), _ = ABSORPTION_RANGE
+    air = (radiation.temperature_degc.value, radiation.humidity_percent.value)
+    if radiation.air_absorption.value and not (coldest <= air[0] <= hottest and air[1] >= driest):
+        yield (
+            f"absorption of the air at {air[0]:g} °C and {air[1]:g} % humidity is extrapolated: ISO 9613-1 states it for "
+            f"{coldest:g} to {hottest:g} °C and {driest:g} % at least"
+        )
 
 
 def _stiffness_doubts(unit: GearUnit, helix: tuple[HelixCase, ...]) -> Iterator[str]:

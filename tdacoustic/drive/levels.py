@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from tdacoustic.drive.sources import SoundSource, StructureSource
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces
-from tdacoustic.radiation import Air, mean_over_sphere_db, overall_level_db, transfer_db
+from tdacoustic.radiation import Air, absorption_db_per_m, mean_over_sphere_db, overall_level_db, transfer_db
 from tdacoustic.spectra.weighting import a_weighting_db
 
 __all__ = ["CIRCLE_DEG", "LevelAt", "PointField", "Receiver", "circle_of"]
@@ -96,6 +96,8 @@ class PointField:
         self._sound_speed_m_s = Air(fleet.number("radiation.temperature_degc")).sound_speed_m_s
         self._ground_m = -0.5 * fleet.train.wheel_diameter_m if self._space == "half" else None
         self.surface = Receiver(f"{radiation.sphere_radius_m.value:g} m", radiation.sphere_radius_m.value)
+        self._absorbing = fleet.radiation.air_absorption.value
+        self._air = (fleet.number("radiation.temperature_degc"), fleet.radiation.humidity_percent.value)
         self.circle = circle_of(fleet)
         self.adds = paths_of_total(fleet)
 
@@ -130,7 +132,8 @@ class PointField:
         receivers : sequence of Receiver
         """
         found = []
-        received = {weighting: self._received_db(sources, receivers, weighting) for weighting in WEIGHTINGS}
+        plain = self._received_db(sources, receivers)
+        received = {weighting: plain + _weights_db(sources, weighting) for weighting in WEIGHTINGS}
         for number, receiver in enumerate(receivers):
             for weighting in WEIGHTINGS:
                 held = received[weighting][:, number]
@@ -146,16 +149,21 @@ class PointField:
         receiver : Receiver
         weighting : {"Z", "A"}
         """
-        return self._received_db(sources, (receiver,), weighting)[:, 0]
+        return (self._received_db(sources, (receiver,)) + _weights_db(sources, weighting))[:, 0]
 
-    def _received_db(self, sources: Sequence[SoundSource], receivers: Sequence[Receiver], weighting: Weighting) -> Real:
-        """Return the level of each source at each receiver, shape (sources, receivers)."""
+    def _received_db(self, sources: Sequence[SoundSource], receivers: Sequence[Receiver]) -> Real:
+        """Return the unweighted level of each source at each receiver, shape (sources, receivers)."""
         at = np.empty((len(sources), len(receivers)))
         for row, source in zip(at, sources, strict=True):
             row[:] = source.sound_power_level_db + self.transfer_db(source, receivers)
-        if weighting == "A":
-            at = at + np.array([float(a_weighting_db(source.frequency_hz)) for source in sources])[:, None]
+            if self._absorbing:
+                row -= self._absorbed_db(source, receivers)
         return at
+
+    def _absorbed_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
+        """Return what the air takes on the straight way from a source to receivers; reflections go as far."""
+        ways = [r.distance_m if r.position_m is None else math.dist(r.position_m, source.position_m) for r in receivers]
+        return np.array(ways) * float(absorption_db_per_m(source.frequency_hz, *self._air))
 
     def _of_path(self, path: Path, sources: Sequence[SoundSource], levels_db: Real) -> float | None:
         wanted = self.adds if path == "total" else (path,)
@@ -166,7 +174,14 @@ class PointField:
         held = [source for source in sources if source.path in self.adds]
         if not held:
             return np.full(len(self.circle), math.nan)
-        return 10.0 * np.log10(np.sum(10.0 ** (0.1 * self._received_db(held, self.circle, "Z")), axis=0))
+        return 10.0 * np.log10(np.sum(10.0 ** (0.1 * self._received_db(held, self.circle)), axis=0))
+
+
+def _weights_db(sources: Sequence[SoundSource], weighting: Weighting) -> Real:
+    """Return what a weighting adds to the level of each source, shape (sources, 1)."""
+    if weighting == "Z":
+        return np.zeros((len(sources), 1))
+    return a_weighting_db(np.array([source.frequency_hz for source in sources]))[:, None]
 
 
 def circle_of(fleet: Fleet) -> tuple[Receiver, ...]:

@@ -29,6 +29,7 @@ class Radiation(Table):
     temperature_degc, humidity_percent : Parameter of float
         Of the air.
     air_absorption : Parameter of bool
+        Whether the air takes from tones on their way (ISO 9613-1).
     """
 
     method: Parameter[Literal["point_sources", "boundary_elements"]] = default("point_sources")

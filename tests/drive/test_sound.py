@@ -140,3 +140,24 @@ def test_what_the_total_adds_is_said(fleet_of, old, new, adds, doubt):
 def test_a_motor_that_cannot_be_computed_is_refused(fleet_of, motor, message):
     with pytest.raises(FleetError, match=message):
         td.DriveModel(fleet_of(motor)).evaluate()
+
+
+def test_the_air_takes_what_iso_9613_says(fleet_of):
+    """3.66 dB/km at 1 kHz, 10 °C and 70 %, in proportion to the way from each source (ISO 9613-2, Table 2)."""
+    tone = '[[motor.excitation]]\nname = "tone"\nfixed_hz = 1000\nsound_power_level_db = 100\n'
+    cold = "[radiation]\ntemperature_degc = 10\nhumidity_percent = 70\n"
+    far = Receiver("far", 1000.0, (1000.0, 0.6, 0.0))
+    levels = []
+    for switch in ("", "air_absorption = true\n"):
+        model = td.DriveModel(fleet_of(MOTOR + tone, **{"[radiation]\n": cold + switch}))
+        levels.append(model.evaluate(receivers=[far]).sound[0])
+    plain, absorbed = levels
+    assert plain.level_db("far", "motor") - absorbed.level_db("far", "motor") == pytest.approx(3.66, abs=0.01)
+    assert plain.level_db("4 m", "motor") - absorbed.level_db("4 m", "motor") == pytest.approx(0.0146, abs=1e-3)
+    assert plain.sound_power_level_db("motor") == absorbed.sound_power_level_db("motor")
+
+
+def test_air_beyond_the_standard_is_a_doubt(fleet_of):
+    dry = "[radiation]\nhumidity_percent = 5\nair_absorption = true\n"
+    doubts = td.DriveModel(fleet_of(MOTOR + FLUX, **{"[radiation]\n": dry})).evaluate().doubts
+    assert any("5 % humidity is extrapolated: ISO 9613-1" in doubt for doubt in doubts)
