@@ -1,6 +1,7 @@
 """A small fleet with a housing, and modes of its box that need no finite elements: plates by formula."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from plain_fleets import plain_fleet
@@ -15,6 +16,8 @@ from tdacoustic.drive.housing_steps import (
     housing_tasks,
     panel_velocities,
 )
+from tdacoustic.drive.insertion_loss import _insertion_loss, air_tasks
+from tdacoustic.drive.source_inside import _cavity
 from tdacoustic.housing import HousingModes
 from tdacoustic.housing.solid_grid import PANELS
 from tdacoustic.housing.surface import panel_nodes
@@ -101,3 +104,10 @@ def sound_of_made_up_modes(fleet, receivers=()):
     assert isinstance(mean, MeanSettings)
     assert isinstance(points, PointSettings)
     return HousingSound(tasks.box, tasks.body, modes, _means(mean, **bands), _points(points, **bands, **near))
+
+
+def air_of_made_up_modes(fleet, housing):
+    """The same with the air inside and the insertion loss, through the functions of the steps."""
+    cavity, loss = air_tasks(fleet, housing_tasks(fleet))
+    air = _cavity(cavity.settings, housing.modes)
+    return replace(housing, cavity=air, insertion_loss=_insertion_loss(loss.settings, housing.modes, housing.mean, air))

@@ -6,11 +6,22 @@ without.
 
 import atexit
 import functools
+import re
 import shutil
 import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
+
+_STUDIES = re.compile(r"(?m)^\[\[(?:reference|feature)\]\]\n(?:(?!\[).*\n?)*")
+"""Another source's numbers and features: holding them against the model takes seconds a prediction."""
+
+_PLAIN = {
+    'method = "boundary_elements"': 'method = "point_sources"',
+    'gear_path = "structure"': 'gear_path = "masuda"',
+    'displacement = "static_ratio"': 'displacement = "um_pp"',
+    'map_conditions = ["5", "1"]': "map_conditions = []",
+}
 
 
 @functools.cache
@@ -22,12 +33,15 @@ def _folder():
 
 @functools.cache
 def plain_fleet(name):
-    """The file of ``calibration/NAME``, elsewhere, with point sources alone."""
+    """The file of ``calibration/NAME``, elsewhere, with point sources alone and without references and features."""
     text = (ROOT / "calibration" / name / "fleet.toml").read_text(encoding="utf-8")
     assert 'method = "boundary_elements"' in text
+    text = _STUDIES.sub("", text)
+    for old, new in _PLAIN.items():
+        text = text.replace(old, new)
     path = _folder() / "calibration" / name / "fleet.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(text.replace('method = "boundary_elements"', 'method = "point_sources"'), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     return path
 
 

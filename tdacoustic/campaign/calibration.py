@@ -64,7 +64,8 @@ class CalibrationSettings(Table):
     Parameters
     ----------
     free : tuple of str
-        Parameters of the fleet to fit, with their usual bounds. Default: Masuda's constant and the mesh damping ratio.
+        Parameters of the fleet to fit, with their usual bounds. Default: Masuda's constant, or the structure's gain
+        where the fleet's total adds the structure in its place, and the mesh damping ratio.
     parameter : tuple of CalibrationParameter
         More of them, or bounds, priors and expressions for those of `free`.
     data : tuple of str

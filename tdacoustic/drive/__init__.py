@@ -5,6 +5,7 @@ from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
 from tdacoustic.drive.housing_field import HousingField, HousingSound
 from tdacoustic.drive.levels import LevelAt, Receiver
 from tdacoustic.drive.model import DriveModel
+from tdacoustic.drive.near_field import NearField, pattern_correlation
 from tdacoustic.drive.prediction import (
     Directivity,
     DriveSound,
@@ -30,6 +31,7 @@ __all__ = [
     "HousingField",
     "HousingSound",
     "LevelAt",
+    "NearField",
     "Prediction",
     "Receiver",
     "SoundSource",
@@ -37,5 +39,6 @@ __all__ = [
     "StructureSource",
     "conditions_of",
     "gear_unit_of",
+    "pattern_correlation",
     "torque_at",
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet, Kinematics
 
-__all__ = ["WHEEL_DRIVES", "Condition", "conditions_of", "torque_at"]
+__all__ = ["WHEEL_DRIVES", "Condition", "conditions_of", "followed", "torque_at"]
 
 WHEEL_DRIVES: Final = frozenset({"brake", "coast", "hauled"})
 """Modes in which the wheelset drives the motor, so that the other flanks of the teeth carry."""
@@ -60,6 +60,27 @@ def conditions_of(fleet: Fleet) -> tuple[Condition, ...]:
         Condition(name, speed, kinematics.motor_hz_at_km_h(speed), torque_at(fleet, speed), mode)
         for name, speed in zip(fleet.operation.names, speeds, strict=True)
     )
+
+
+def followed(condition: Condition, before: Fleet, after: Fleet) -> Condition:
+    """Return a condition with the speed and torque that a changed fleet gives it, where the fleet gave them before.
+
+    The train's speed stays; what runs state of torque or turns stays too.
+
+    Parameters
+    ----------
+    condition : Condition
+    before, after : Fleet
+    """
+    speed = condition.train_speed_km_h
+    motor_hz, torque_n_m = condition.motor_hz, condition.torque_n_m
+    if math.isclose(Kinematics.of(before).motor_hz_at_km_h(speed), motor_hz, rel_tol=1e-9):
+        motor_hz = Kinematics.of(after).motor_hz_at_km_h(speed)
+    try:
+        of_law = math.isclose(torque_at(before, speed), torque_n_m, rel_tol=1e-9)
+    except FleetError:  # there is no law: the runs state their torques
+        of_law = False
+    return replace(condition, motor_hz=motor_hz, torque_n_m=torque_at(after, speed) if of_law else torque_n_m)
 
 
 def torque_at(fleet: Fleet, train_speed_km_h: float) -> float:

@@ -57,6 +57,11 @@ def structure_doubts(fleet: Fleet, mesh_hz: Sequence[tuple[str, float]]) -> Iter
         )
     elif fleet.model.gear_path.value != "masuda":
         yield f"the structure's sound is that of the bearing forces' lines up to {highest_hz:g} Hz, and of none beyond"
+    if fleet.masuda.placement.value == "inside" and fleet.model.gear_path.value != "structure" and silent:
+        yield (
+            f"condition{'s' if len(silent) > 1 else ''} {', '.join(silent)}: Masuda's source inside the housing has no "
+            f"sound there, because the mesh frequency lies above max_frequency_hz = {highest_hz:g}"
+        )
     later = len(fleet.gear_pair) - fleet.modelled_pair_number
     if later % 2:
         yield (
@@ -87,16 +92,13 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
             f'gear_path = "{gear_path}": the bearing forces\' way through the housing takes method = '
             '"boundary_elements", so the total lacks it'
         )
-    if gear_path == "sum" and placement == "free":
+    if gear_path == "sum" and placement != "off":
         yield (
             'gear_path = "sum": the gear is counted twice, once by Masuda\'s level of the whole unit and once by the '
             "bearing forces through its housing"
         )
     if placement == "inside" and gear_path != "structure":
-        yield (
-            "Masuda's source is put inside the housing, whose insertion loss is not there yet: the total holds "
-            "nothing of it, and its constant cannot be seen in a level outside"
-        )
+        yield _inside_doubt(fleet)
     if placement == "off":
         yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
     yield from _air_doubts(fleet)
@@ -109,14 +111,26 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
         yield "the motor makes no sound in this model: the levels are those of the gears alone"
 
 
+def _inside_doubt(fleet: Fleet) -> str:
+    if fleet.radiation.method.value == "point_sources":
+        return (
+            'Masuda\'s source is put inside the housing, whose sound takes method = "boundary_elements": the total '
+            "holds nothing of it, and its constant cannot be seen in a level outside"
+        )
+    return (
+        "Masuda's source is put inside the housing: his level is of gear units measured with their housings, so here "
+        "the housing's insertion loss is taken from it a second time"
+    )
+
+
 def _air_doubts(fleet: Fleet) -> Iterator[str]:
     radiation = fleet.radiation
     (coldest, hottest), (driest, _), _ = ABSORPTION_RANGE
     air = (radiation.temperature_degc.value, radiation.humidity_percent.value)
     if radiation.air_absorption.value and not (coldest <= air[0] <= hottest and air[1] >= driest):
         yield (
-            f"absorption of the air at {air[0]:g} °C and {air[1]:g} % humidity is extrapolated: ISO 9613-1 states it for "
-            f"{coldest:g} to {hottest:g} °C and {driest:g} % at least"
+            f"absorption of the air at {air[0]:g} °C and {air[1]:g} % humidity is extrapolated: ISO 9613-1 states it "
+            f"for {coldest:g} to {hottest:g} °C and {driest:g} % at least"
         )
 
 

@@ -1,4 +1,4 @@
-"""The housing of a fleet: its box, the air around it, and where the point sources stand."""
+"""The housing of a fleet: a box or a STEP file's solid, the air around it, and where the point sources stand."""
 
 from __future__ import annotations
 
@@ -8,17 +8,21 @@ from dataclasses import replace
 from typing import Final
 
 from tdacoustic.drive.gear_unit import GearUnit
+from tdacoustic.drive.housing_solid import is_solid, solid_of
+from tdacoustic.drive.solid_in_air import SolidInAir
 from tdacoustic.drive.sources import SourcePlaces
 from tdacoustic.errors import FleetError, RadiationError
 from tdacoustic.fleet import Fleet
 from tdacoustic.fleet.housing import HousingSeat
-from tdacoustic.housing import Box, HousingError, Seat, horizontal_centres
+from tdacoustic.housing import Box, HousingError, Seat, SolidHousing, horizontal_centres
 from tdacoustic.radiation import Air
+from tdacoustic.radiation.body_in_air import BodyInAir
 from tdacoustic.radiation.box_in_air import BoxInAir
 
-__all__ = ["body_of", "box_of", "ground_of", "source_places"]
+__all__ = ["AnyHousing", "body_of", "box_of", "ground_of", "housing_of", "source_places"]
 
 Point = tuple[float, float, float]
+AnyHousing = Box | SolidHousing
 
 ABOVE_TOP_M: Final = 0.1
 """Of the mesh's free source above the middle of the housing's top, where the fleet does not say [assumed]."""
@@ -29,8 +33,25 @@ def ground_of(fleet: Fleet) -> float | None:
     return -0.5 * fleet.train.wheel_diameter_m if fleet.radiation.space.value == "half" else None
 
 
+def housing_of(fleet: Fleet, unit: GearUnit) -> AnyHousing:
+    """Return the housing of a fleet: the solid of its STEP file where it names one, else its box.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    unit : GearUnit
+        For the centre distance.
+
+    Raises
+    ------
+    FleetError
+        As `box_of`, or the STEP file holds no housing.
+    """
+    return solid_of(fleet, unit) if is_solid(fleet) else box_of(fleet, unit)
+
+
 def box_of(fleet: Fleet, unit: GearUnit) -> Box:
-    """Return the housing of a fleet.
+    """Return the parametric housing of a fleet.
 
     Seats without a position lie on a horizontal line of centres in the middle of the box, the gears' centre distance
     apart, each gear in the middle between its bearings [assumed].
@@ -49,7 +70,7 @@ def box_of(fleet: Fleet, unit: GearUnit) -> Box:
     if fleet.housing is None:
         raise FleetError(f"{fleet.path}: [housing] is missing, and boundary elements need it")
     if fleet.housing.step_file is not None:
-        raise FleetError(f"{fleet.path}: [housing]: step_file: only the parametric box can be computed")
+        raise FleetError(f"{fleet.path}: [housing]: step_file: this needs the parametric box")
     lengths = {f"{panel}_m": fleet.number(f"housing.{panel}_mm") for panel in ("wall", "bearing_panel", "top_bottom")}
     size = fleet.get("housing.size_m").value
     try:
@@ -107,8 +128,14 @@ def _seat(fleet: Fleet, number: int, seat: HousingSeat, default: tuple[float, fl
     )
 
 
-def source_places(fleet: Fleet) -> SourcePlaces:
+def source_places(fleet: Fleet, top_m: Point | None = None) -> SourcePlaces:
     """Return where the motor's and the mesh's point sources stand.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    top_m : (float, float, float), optional
+        Middle of the housing's top in the drive frame; default that of the box.
 
     Raises
     ------
@@ -116,8 +143,9 @@ def source_places(fleet: Fleet) -> SourcePlaces:
         With boundary elements: the motor makes sound and has no position.
     """
     assert fleet.housing is not None
-    x, y, z = fleet.housing.position_m.value
-    top = 0.5 * fleet.get("housing.size_m").value[2]
+    if top_m is None:
+        x, y, z = fleet.housing.position_m.value
+        top_m = (x, y, z + 0.5 * fleet.get("housing.size_m").value[2])
     mesh = fleet.masuda.position_m if fleet.masuda.placement.value == "free" else None
     motor = fleet.motor
     sounds = motor is not None and any(
@@ -129,41 +157,29 @@ def source_places(fleet: Fleet) -> SourcePlaces:
             "beside the housing"
         )
     place = None if motor is None or motor.position_m is None or not sounds else motor.position_m.value
-    return SourcePlaces((x, y, z + top + ABOVE_TOP_M) if mesh is None else mesh.value, place)
+    x, y, top = top_m
+    return SourcePlaces((x, y, top + ABOVE_TOP_M) if mesh is None else mesh.value, place)
 
 
-def body_of(fleet: Fleet, box: Box, receivers_m: Sequence[tuple[str, Point]] = ()) -> BoxInAir:
+def body_of(fleet: Fleet, housing: AnyHousing, receivers_m: Sequence[tuple[str, Point]] = ()) -> BoxInAir | SolidInAir:
     """Return the housing in its air, with the sources and with those receivers that are close.
 
     Parameters
     ----------
     fleet : Fleet
-    box : Box
+    housing : Box or SolidHousing
     receivers_m : sequence of (str, (float, float, float))
         Names and places.
 
     Raises
     ------
     FleetError
-        A source or receiver in the housing or at its walls, or what `BoxInAir` refuses.
+        A source or receiver in the housing or at its walls, or what `BodyInAir` refuses.
     """
-    assert fleet.housing is not None
-    air = Air(fleet.number("radiation.temperature_degc"))
-    places = source_places(fleet)
-    sources = [("the mesh's source ([masuda] position_m)", places.mesh_m)]
-    if places.motor_m is not None:
-        sources.append(("the motor's source ([motor] position_m)", places.motor_m))
     try:
-        body = BoxInAir(
-            box.extent_m,
-            fleet.housing.position_m.value,
-            air.sound_speed_m_s,
-            air.impedance_pa_s_m,
-            ground_of(fleet),
-            tuple(place for _, place in sources),
-            elements_per_wavelength=fleet.radiation.elements_per_wavelength.value,
-        )
-        for name, place in (*sources, *receivers_m):
+        body = _solid_in_air(fleet, housing) if isinstance(housing, SolidHousing) else _box_in_air(fleet, housing)
+        named = ("the mesh's source ([masuda] position_m)", "the motor's source ([motor] position_m)")
+        for name, place in (*zip(named, body.sources_m, strict=False), *receivers_m):
             _outside(body, name, place)
         for name, place in receivers_m:
             if any(math.dist(place, source) < 1e-3 for source in body.sources_m):
@@ -173,7 +189,49 @@ def body_of(fleet: Fleet, box: Box, receivers_m: Sequence[tuple[str, Point]] = (
         raise FleetError(f"{fleet.path}: [radiation]: {error}") from error
 
 
-def _outside(body: BoxInAir, name: str, place: Point) -> None:
+def _box_in_air(fleet: Fleet, box: Box) -> BoxInAir:
+    assert fleet.housing is not None
+    air = Air(fleet.number("radiation.temperature_degc"))
+    return BoxInAir(
+        box.extent_m,
+        fleet.housing.position_m.value,
+        air.sound_speed_m_s,
+        air.impedance_pa_s_m,
+        ground_of(fleet),
+        _sources(source_places(fleet)),
+        elements_per_wavelength=fleet.radiation.elements_per_wavelength.value,
+    )
+
+
+def _solid_in_air(fleet: Fleet, solid: SolidHousing) -> SolidInAir:
+    assert fleet.housing is not None
+    air = Air(fleet.number("radiation.temperature_degc"))
+    origin = fleet.housing.position_m.value
+    (x0, y0, z0), (x1, y1, z1) = (
+        tuple(round(place + own, 7) for place, own in zip(end, origin, strict=True))
+        for end in (solid.low_m, solid.high_m)
+    )
+    return SolidInAir(
+        (x0, y0, z0),
+        (x1, y1, z1),
+        tuple((axis, round(at + origin["xyz".index(axis)], 7)) for axis, at in solid.planes_m),
+        round(solid.area_m2, 4),
+        air.sound_speed_m_s,
+        air.impedance_pa_s_m,
+        ground_of(fleet),
+        _sources(source_places(fleet, (0.5 * (x0 + x1), 0.5 * (y0 + y1), z1))),
+        elements_per_wavelength=fleet.radiation.elements_per_wavelength.value,
+        origin_m=origin,
+        housing=solid,
+    )
+
+
+def _sources(places: SourcePlaces) -> tuple[Point, ...]:
+    """The mesh's source, and the motor's where it makes sound."""
+    return (places.mesh_m,) if places.motor_m is None else (places.mesh_m, places.motor_m)
+
+
+def _outside(body: BodyInAir, name: str, place: Point) -> None:
     apart = body.distance_m(place)
     if apart < body.clearance_m:
         where = "lies inside the housing" if apart <= 0.0 else f"is {1e3 * apart:.0f} mm from the housing's wall"

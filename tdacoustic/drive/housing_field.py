@@ -10,19 +10,22 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from tdacoustic.drive.housing_solid import solid_notes
+from tdacoustic.drive.insertion_loss import InsertionLoss, with_conditions
 from tdacoustic.drive.levels import PointField, Receiver
-from tdacoustic.drive.prediction import HousingFacts
+from tdacoustic.drive.prediction import GearState, HousingFacts
+from tdacoustic.drive.source_inside import HousingCavity, SourceInside
 from tdacoustic.drive.sources import SoundSource, StructureSource
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces
 from tdacoustic.gears.masuda import SPHERE_OF_1_M_DB
-from tdacoustic.housing import Box, HousingModes, seat_loads
+from tdacoustic.housing import Box, HousingModes, SolidHousing, SolidModes, seat_loads
 from tdacoustic.radiation import mean_over_sphere_db
-from tdacoustic.radiation.box_in_air import BoxInAir
+from tdacoustic.radiation.body_in_air import BodyInAir
 from tdacoustic.radiation.received import MeanVectors, PointVectors
 
-__all__ = ["HousingField", "HousingSound"]
+__all__ = ["HousingField", "HousingSound", "number_of"]
 
 Real = NDArray[np.float64]
 Point = tuple[float, float, float]
@@ -38,19 +41,31 @@ class HousingSound:
 
     Parameters
     ----------
-    box : Box
+    box : Box or SolidHousing
         With the fleet's loss factor and gears.
-    body : BoxInAir
-    modes : HousingModes
+    body : BodyInAir
+    modes : HousingModes or SolidModes
     mean : MeanVectors
     points : PointVectors
+    cavity : HousingCavity, optional
+        The air inside, where there is any that can be computed.
+    insertion_loss : InsertionLoss, optional
     """
 
-    box: Box
-    body: BoxInAir
-    modes: HousingModes
+    box: Box | SolidHousing
+    body: BodyInAir
+    modes: HousingModes | SolidModes
     mean: MeanVectors
     points: PointVectors
+    cavity: HousingCavity | None = None
+    insertion_loss: InsertionLoss | None = None
+
+    @cached_property
+    def inside(self) -> SourceInside | None:
+        """A source in the air inside; None without it."""
+        if self.cavity is None or not isinstance(self.modes, HousingModes):
+            return None
+        return SourceInside(self.cavity, self.modes.frequency_hz, self.body.position_m)
 
     @cached_property
     def places(self) -> dict[Point, int]:
@@ -87,8 +102,11 @@ class HousingField(PointField):
         super().__init__(fleet)
         self.housing = housing
         self._path = fleet.path
+        self._step_file = fleet.step_path.name if fleet.step_path is not None else None
         self.mesh_position_m = housing.body.sources_m[_MESH]
         self._loss_factor = fleet.number("housing.loss_factor")
+        self._cavity_loss_factor = fleet.number("housing.cavity_loss_factor")
+        self._is_inside = fleet.masuda.placement.value == "inside"
         self._gain_db = fleet.model.structure_gain_db.value
         self._surface_db = mean_over_sphere_db(self.surface.distance_m, self._space)
 
@@ -106,7 +124,37 @@ class HousingField(PointField):
             held.body.position_m,
             sources[_MESH],
             sources[_MOTOR] if len(sources) > _MOTOR else None,
+            held.inside.source_m if self._is_inside and held.inside is not None else None,
+            *((self._step_file, solid_notes(held.box, held.body)) if isinstance(held.box, SolidHousing) else ()),
         )
+
+    def meshing(self, source: SoundSource) -> SoundSource | None:
+        """Return the meshing noise as the field has it; None of a source inside that the housing does not reach.
+
+        The free source as it is; of one inside, the housing that it shakes through the air: its volume flow is held.
+        """
+        if not self._is_inside:
+            return source
+        held, frequency = self.housing, source.frequency_hz
+        if held.inside is None:
+            raise FleetError(f'{self._path}: [masuda] placement = "inside" needs the air inside a parametric box')
+        if not held.reaches(frequency):
+            return None
+        pressure_pa = math.sqrt(2.0) * _REFERENCE_PA * 10.0 ** (0.05 * (source.sound_power_level_db - SPHERE_OF_1_M_DB))
+        moved = pressure_pa * held.inside.velocities(frequency, self._loss_factor, self._cavity_loss_factor)
+        square = 0.5 * held.mean.of_modes(frequency, moved)
+        if not square > 0.0:
+            return None
+        level = 10.0 * math.log10(square / _REFERENCE_PA**2) - self._surface_db
+        return StructureSource("mesh", source.name, frequency, level, held.body.position_m, moved)
+
+    def insertion_loss(self, states: Sequence[GearState]) -> InsertionLoss | None:
+        """Return the housing's insertion loss with those at the mesh frequencies of states; None where it has none."""
+        held = self.housing
+        if held.insertion_loss is None or held.inside is None:
+            return None
+        factors = self._loss_factor, self._cavity_loss_factor
+        return with_conditions(held.insertion_loss, states, held.inside, held.mean, self._surface_db, factors)
 
     def structure_sources(
         self, forces: BearingForces | None, loss_factor: float | None = None
@@ -173,11 +221,14 @@ class HousingField(PointField):
         if isinstance(source, StructureSource):
             squares = 0.5 * held.points.of_modes(source.frequency_hz, source.velocities, numbers)
             return _decibels(squares / _REFERENCE_PA**2) - source.sound_power_level_db
-        number = _MESH if source.path == "mesh" else _MOTOR
-        squares = held.points.of_source(held.body, source.frequency_hz, number, numbers)
-        if number == _MOTOR:
+        squares = held.points.of_source(held.body, source.frequency_hz, number_of(source), numbers)
+        return self._of_unit_db(source, squares)
+
+    def _of_unit_db(self, source: SoundSource, squares: Real) -> Real:
+        """Levels less the sound power level of a point source, of |p|² of that source with 1 Pa at 1 m."""
+        if number_of(source) == _MOTOR:
             return _decibels(squares) - SPHERE_OF_1_M_DB
-        return _decibels(squares / held.mean.of_source(source.frequency_hz, _MESH)) + self._surface_db
+        return _decibels(squares / self.housing.mean.of_source(source.frequency_hz, _MESH)) + self._surface_db
 
     def doubts(self, sources: Sequence[SoundSource]) -> Iterator[str]:
         """Yield what the reader must know of the reach of the transfer vectors."""
@@ -189,6 +240,11 @@ class HousingField(PointField):
                 f"{max(beyond):.0f} Hz lie outside of the {low:.0f} to {high:.0f} Hz that the housing is computed for: "
                 "they are not scattered by it"
             )
+
+
+def number_of(source: SoundSource) -> int:
+    """Return the number of a point source among those of the housing's body."""
+    return _MESH if source.path == "mesh" else _MOTOR
 
 
 def _decibels(squares: Real) -> Real:

@@ -8,7 +8,7 @@ housing's loss factor, so that all conditions share them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Final
@@ -17,11 +17,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive.gear_unit import gear_unit_of
-from tdacoustic.drive.housing_box import body_of, box_of
+from tdacoustic.drive.housing_box import AnyHousing, body_of, housing_of
+from tdacoustic.drive.housing_solid import SOLID_MODES, solid_modes_task
 from tdacoustic.drive.levels import Receiver, circle_of
+from tdacoustic.drive.solid_in_air import SolidInAir
 from tdacoustic.errors import FleetError, RadiationError
 from tdacoustic.fleet import Fleet
-from tdacoustic.housing import Box, HousingModes, housing_modes
+from tdacoustic.housing import Box, HousingModes, SolidModes, housing_modes
+from tdacoustic.radiation.body_in_air import BodyInAir
 from tdacoustic.radiation.box_in_air import BoxInAir
 from tdacoustic.radiation.received import MeanVectors, PointVectors, mean_vectors, point_vectors
 from tdacoustic.radiation.surfaces import Surface
@@ -41,6 +44,7 @@ __all__ = [
     "MEAN_VECTORS",
     "NEAR_VECTORS",
     "POINT_VECTORS",
+    "SOLID_MODES",
     "TRANSFER_VECTORS",
     "HousingTasks",
     "housing_tasks",
@@ -71,11 +75,11 @@ class BandSettings:
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BoxInAir or SolidInAir
     band : TransferBand
     """
 
-    body: BoxInAir
+    body: BoxInAir | SolidInAir
     band: TransferBand
 
 
@@ -85,11 +89,11 @@ class MeanSettings:
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BoxInAir or SolidInAir
     radius_m : float
     """
 
-    body: BoxInAir
+    body: BoxInAir | SolidInAir
     radius_m: float
 
 
@@ -99,11 +103,11 @@ class PointSettings:
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BoxInAir or SolidInAir
     points_m : tuple of (float, float, float)
     """
 
-    body: BoxInAir
+    body: BoxInAir | SolidInAir
     points_m: tuple[Point, ...]
 
 
@@ -111,14 +115,24 @@ def _modes(settings: ModesSettings) -> HousingModes:
     return housing_modes(settings.box, settings.highest_hz)
 
 
-def _transfer(settings: BandSettings, modes: HousingModes) -> TransferNodes:
-    velocities_of = partial(panel_velocities, modes, position_m=settings.body.position_m)
-    return transfer_band(settings.body, settings.band, velocities_of, tell_progress)
+def _transfer(settings: BandSettings, modes: HousingModes | SolidModes) -> TransferNodes:
+    body, velocities_of = _moving(settings, modes)
+    return transfer_band(body, settings.band, velocities_of, tell_progress)
 
 
-def _near(settings: BandSettings, modes: HousingModes) -> NearNodes:
-    velocities_of = partial(panel_velocities, modes, position_m=settings.body.position_m)
-    return near_band(settings.body, settings.band, velocities_of, tell_progress)
+def _near(settings: BandSettings, modes: HousingModes | SolidModes) -> NearNodes:
+    body, velocities_of = _moving(settings, modes)
+    return near_band(body, settings.band, velocities_of, tell_progress)
+
+
+def _moving(settings: BandSettings, modes: HousingModes | SolidModes) -> tuple[BodyInAir, Callable[[Surface], Real]]:
+    """Return the body with its grids, and what gives the velocities of their panels."""
+    if isinstance(modes, HousingModes):
+        return settings.body, partial(panel_velocities, modes, position_m=settings.body.position_m)
+    assert isinstance(settings.body, SolidInAir)
+    body = settings.body.with_panels(modes)
+    velocities = np.asarray(body.panels_for(settings.band.grid_hz).velocities, dtype=np.float64)
+    return body, lambda _: velocities
 
 
 def _means(settings: MeanSettings, **bands: TransferNodes) -> MeanVectors:
@@ -177,9 +191,9 @@ class HousingTasks:
 
     Parameters
     ----------
-    box : Box
+    box : Box or SolidHousing
         With the fleet's own loss factor and gears.
-    body : BoxInAir
+    body : BoxInAir or SolidInAir
     modes : Task
     bands : tuple of Task
     near : tuple of Task
@@ -189,8 +203,8 @@ class HousingTasks:
         Around the circle first.
     """
 
-    box: Box
-    body: BoxInAir
+    box: AnyHousing
+    body: BoxInAir | SolidInAir
     modes: Task
     bands: tuple[Task, ...]
     near: tuple[Task, ...]
@@ -212,26 +226,26 @@ def housing_tasks(fleet: Fleet, receivers: Sequence[Receiver] = ()) -> HousingTa
     FleetError
         ``[housing]``, ``[radiation]`` or the place of a source or receiver does not allow it.
     """
-    box = box_of(fleet, gear_unit_of(fleet))
+    unit = gear_unit_of(fleet)
+    box = housing_of(fleet, unit)
     circle = circle_of(fleet)
     placed = tuple(dict.fromkeys(receiver for receiver in receivers if receiver.position_m is not None))
     names = [(f"the receiver {r.name}", r.position_m) for r in placed if r.position_m is not None]
     names += [("the circle ([radiation] circle_radius_m)", r.position_m) for r in circle if r.position_m is not None]
     body = body_of(fleet, box, names)
     highest_hz = fleet.radiation.max_frequency_hz.value
-    pinion, wheel = (replace(seat, gear_y_m=0.0) for seat in box.seats)
-    alike = replace(box, loss_factor=0.02, seats=(pinion, wheel))
-    modes = HOUSING_MODES.task(f"up to {highest_hz:g} Hz", ModesSettings(alike, highest_hz))
+    modes = _box_modes_task(box, highest_hz) if isinstance(box, Box) else solid_modes_task(fleet, unit, box)
     radius_m = fleet.radiation.sphere_radius_m.value
-    alone = replace(body, near_m=())
+    known = body.alone if isinstance(body, SolidInAir) else body
+    alone = replace(known, near_m=())
     try:
         held = bands_of(body, highest_hz)
         alone.check_sphere(radius_m)
     except RadiationError as error:
         raise FleetError(f"{fleet.path}: [radiation]: {error}") from error
-    bands = tuple(TRANSFER_VECTORS.task(_reach(band), BandSettings(alone, band), modes=modes) for band in held)
+    bands = tuple(TRANSFER_VECTORS.task(_cost(body, band), BandSettings(alone, band), modes=modes) for band in held)
     close = held if body.near_m else ()
-    near = tuple(NEAR_VECTORS.task(_reach(band), BandSettings(body, band), modes=modes) for band in close)
+    near = tuple(NEAR_VECTORS.task(_reach(band), BandSettings(known, band), modes=modes) for band in close)
     inputs = {f"band_{number}": task for number, task in enumerate(bands)}
     of_near = {f"near_{number}": task for number, task in enumerate(near)}
     mean = MEAN_VECTORS.task(f"{radius_m:g} m", MeanSettings(alone, radius_m), **inputs)
@@ -244,8 +258,22 @@ def housing_tasks(fleet: Fleet, receivers: Sequence[Receiver] = ()) -> HousingTa
         bands,
         near,
         mean,
-        POINT_VECTORS.task(f"{len(points)} receivers", PointSettings(body, points), **inputs, **of_near),
+        POINT_VECTORS.task(f"{len(points)} receivers", PointSettings(known, points), **inputs, **of_near),
     )
+
+
+def _box_modes_task(box: Box, highest_hz: float) -> Task:
+    pinion, wheel = (replace(seat, gear_y_m=0.0) for seat in box.seats)
+    alike = replace(box, loss_factor=0.02, seats=(pinion, wheel))
+    return HOUSING_MODES.task(f"up to {highest_hz:g} Hz", ModesSettings(alike, highest_hz))
+
+
+def _cost(body: BoxInAir | SolidInAir, band: TransferBand) -> str:
+    """Which frequencies, and for a solid on how many panels: without mirror planes the work is up to 64 times."""
+    if isinstance(body, BoxInAir):
+        return _reach(band)
+    panels, taken = body.panels_about(band.grid_hz), body.needed_bytes(band.grid_hz)
+    return f"{_reach(band)}, some {panels:.0f} panels, {1e-9 * taken:.1f} GB"
 
 
 def _reach(band: TransferBand) -> str:

@@ -107,6 +107,10 @@ class PointField:
         """Return the tones of the housing under bearing forces: none of a field without housing."""
         return ()
 
+    def meshing(self, source: SoundSource) -> SoundSource | None:
+        """Return the meshing noise as the field has it: the free source, wherever it is put."""
+        return source
+
     def doubts(self, sources: Sequence[SoundSource]) -> Iterator[str]:
         """Yield what the reader must know of the field of sources."""
         yield from ()
@@ -196,11 +200,12 @@ def circle_of(fleet: Fleet) -> tuple[Receiver, ...]:
 def paths_of_total(fleet: Fleet) -> tuple[Path, ...]:
     """Return the paths that the total adds: the motor, and the gear by ``[model] gear_path`` and Masuda's placement.
 
-    Masuda's source inside of the housing or off adds nothing here: what the housing lets through is part of the
-    housing's model.
+    Masuda's source inside of the housing adds what the housing lets through where the housing is computed, and nothing
+    with point sources.
     """
-    gear_path = fleet.model.gear_path.value
-    mesh: tuple[Path, ...] = ("mesh",) if fleet.masuda.placement.value == "free" else ()
+    gear_path, placement = fleet.model.gear_path.value, fleet.masuda.placement.value
+    heard = placement == "free" or (placement == "inside" and fleet.radiation.method.value == "boundary_elements")
+    mesh: tuple[Path, ...] = ("mesh",) if heard else ()
     structure: tuple[Path, ...] = ("structure",)
     of_gear = {"masuda": mesh, "structure": structure, "sum": (*structure, *mesh)}[gear_path]
     return ("motor", *of_gear)

@@ -9,8 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive.conditions import Condition
+from tdacoustic.drive.coupling import Coupling
 from tdacoustic.drive.gear_unit import GearUnit
+from tdacoustic.drive.insertion_loss import InsertionLoss
 from tdacoustic.drive.levels import LevelAt
+from tdacoustic.drive.near_field import NearField
 from tdacoustic.drive.sources import SoundSource
 from tdacoustic.gears import BearingForces, Branch, SteadyState
 from tdacoustic.radiation import overall_level_db
@@ -111,6 +114,12 @@ class HousingFacts:
         Of the housing's middle and of the mesh's free source, in the drive frame.
     motor_m : (float, float, float) or None
         Of the motor's sources; None of a motor without sound.
+    inside_m : (float, float, float) or None
+        Of the mesh's source inside the housing, in the drive frame; None of one that is not there.
+    step_file : str or None
+        Name of the file that the housing is from; None of a parametric box.
+    notes : tuple of str
+        What was done to the solid of that file, in whole sentences.
     """
 
     mass_kg: float
@@ -121,6 +130,9 @@ class HousingFacts:
     position_m: tuple[float, float, float]
     mesh_m: tuple[float, float, float]
     motor_m: tuple[float, float, float] | None
+    inside_m: tuple[float, float, float] | None = None
+    step_file: str | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -180,6 +192,12 @@ class Prediction:
         What the reader must know before using the numbers.
     housing : HousingFacts or None
         None of a field of point sources.
+    maps : tuple of NearField
+        Of the conditions of ``[radiation] map_conditions``.
+    coupling : Coupling or None
+        One-way against two-way coupling of gears and housing; None without a housing.
+    insertion_loss : InsertionLoss or None
+        Of the housing, whatever the placement of Masuda's source; None without a housing.
     """
 
     unit: GearUnit
@@ -191,6 +209,9 @@ class Prediction:
     sweep: SpeedSweep | None
     doubts: tuple[str, ...]
     housing: HousingFacts | None = None
+    maps: tuple[NearField, ...] = ()
+    coupling: Coupling | None = None
+    insertion_loss: InsertionLoss | None = None
 
     def sound_of(self, condition: str) -> DriveSound | None:
         """Return the drive's sound in a condition, or None where it was not computed."""

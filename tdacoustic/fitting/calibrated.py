@@ -11,6 +11,7 @@ from tdacoustic.drive import DriveSound
 from tdacoustic.fitting.intervals import ProfileInterval
 from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.fitting.next_measurement import NextMeasurement
+from tdacoustic.fitting.optimum import Fit
 from tdacoustic.fitting.posterior import Posterior
 from tdacoustic.fitting.settings import FitSettings
 from tdacoustic.fitting.transfer import Transferred
@@ -130,6 +131,8 @@ class Calibration:
         What an earlier calibration said.
     doubts : tuple of str
         What must be known before the values are used; empty of a fit without any.
+    fit : Fit or None
+        The optimum with its neighbourhood, from which the parameters can be drawn together.
     """
 
     fleet: Fleet
@@ -150,6 +153,7 @@ class Calibration:
     posterior: Posterior | None
     transferred: tuple[Transferred, ...]
     doubts: tuple[str, ...]
+    fit: Fit | None = None
 
     @property
     def moved(self) -> tuple[FittedParameter, ...]:

@@ -144,6 +144,7 @@ def calibrate_fleet(
             *doubts_of_posterior(posterior),
             *doubts_of_transfer(compared),
         ),
+        found,
     )
 
 

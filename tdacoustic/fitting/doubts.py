@@ -184,9 +184,14 @@ def doubts_of_fleet(fleet: Fleet) -> Iterator[str]:
     """Yield what the fleet's own choices make doubtful."""
     if fleet.model.gear_path.value == "sum":
         yield 'gear counted twice: gear_path = "sum" adds the bearing forces\' sound to a level that already holds it'
-    if fleet.masuda.placement.value == "inside":
+    if fleet.masuda.placement.value == "inside" and fleet.radiation.method.value == "point_sources":
         yield (
             "Masuda's source is inside the housing: nothing of it reaches a receiver, so its constant cannot be found"
+        )
+    elif fleet.masuda.placement.value == "inside":
+        yield (
+            "Masuda's source is inside the housing: a constant that is fitted there makes up for the insertion loss, "
+            "which the level of a gear unit already holds"
         )
 
 

@@ -18,14 +18,14 @@ from tdacoustic.drive import (
     HousingSound,
     Receiver,
     SoundSource,
-    torque_at,
 )
-from tdacoustic.drive.levels import paths_of_total
-from tdacoustic.errors import FittingError, FleetError, TdacousticError
+from tdacoustic.drive.conditions import followed
+from tdacoustic.drive.levels import Path, paths_of_total
+from tdacoustic.errors import FittingError, TdacousticError
 from tdacoustic.fitting.measured_level import OFFSET, MeasuredLevel, offset_name
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fitting.response import Response, response_of
-from tdacoustic.fleet import Fleet, Kinematics
+from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces, bearing_forces
 from tdacoustic.radiation import overall_level_db
 
@@ -36,13 +36,16 @@ Real = NDArray[np.float64]
 DYNAMIC: Final = ("train.", "gear_pair.", "gear_dynamics.", "operation.")
 """Parameters that change the motion of the gears."""
 
+OF_FOUNDATION: Final = ("housing.",)
+"""Parameters that change it too where gears and housing are coupled both ways."""
+
 OF_MOTOR: Final = ("motor.",)
 """Parameters that change nothing at the gears but what the motor radiates."""
 
 OF_GEARS: Final = ("gear_dynamics.", "masuda.", "housing.")
 """Parameters that change nothing of the motor."""
 
-GAINS: Final[Mapping[str, str]] = {
+GAINS: Final[Mapping[str, Path]] = {
     "masuda.constant_db": "mesh",
     "model.structure_gain_db": "structure",
     "model.motor_gain_db": "motor",
@@ -50,7 +53,7 @@ GAINS: Final[Mapping[str, str]] = {
 """Parameters that add to the level of a path as they stand: nothing is computed anew for them."""
 
 OF_TRANSFER: Final = ("housing.", "radiation.", "masuda.position_m", "motor.position_m")
-OUTSIDE_TRANSFER: Final = ("housing.loss_factor",)
+OUTSIDE_TRANSFER: Final = ("housing.cavity_loss_factor", "housing.loss_factor")
 """Parameters that transfer vectors depend on, minutes of work for each value, and those among them that are none."""
 
 SILENCE_DB: Final = -200.0
@@ -129,14 +132,31 @@ class LevelModel:
         exact : bool
             Whether the gears are to be computed where `prepare` would interpolate.
         """
-        of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
-        gain = {part: values.get(key, self._gains[key]) - self._gains[key] for key, part in GAINS.items()}
-        mesh, structure = np.split(self._gears_db(of_fleet, exact), 2)
-        levels = {"motor": self._part("motor", of_fleet), "mesh": mesh, "structure": structure}
+        of_fleet, levels, gain = self._paths(values, exact)
         total = 10.0 * np.log10(sum(10.0 ** (0.1 * (level + gain[path])) for path, level in levels.items()))
         if len(of_fleet) < len(values):
             total = total + np.array([values.get(offset_name(datum.campaign), 0.0) for datum in self.data])
         return np.where(np.max(list(levels.values()), axis=0) <= SILENCE_DB, SILENCE_DB, total)
+
+    def paths_db(self, values: Values, exact: bool = False) -> dict[Path, Real]:
+        """Return the level of each path for each datum, shape (n,): minus infinity of one that the total does not add.
+
+        Silence is minus infinity too, NaN what cannot be computed.
+
+        Parameters
+        ----------
+        values, exact
+            As of `levels_db`; offsets of campaigns are none of the drive.
+        """
+        _, levels, gain = self._paths(values, exact)
+        return {path: np.where(level <= SILENCE_DB, -math.inf, level + gain[path]) for path, level in levels.items()}
+
+    def _paths(self, values: Values, exact: bool) -> tuple[dict[str, float], dict[Path, Real], dict[Path, float]]:
+        """Values of the fleet, levels of the paths with the fleet's own gains, and what the values add to these."""
+        of_fleet = {name: value for name, value in values.items() if "." in name and not name.startswith(OFFSET)}
+        gain = {part: values.get(key, self._gains[key]) - self._gains[key] for key, part in GAINS.items()}
+        mesh, structure = np.split(self._gears_db(of_fleet, exact), 2)
+        return of_fleet, {"motor": self._part("motor", of_fleet), "mesh": mesh, "structure": structure}, gain
 
     def sounds(self, values: Values) -> tuple[DriveSound, ...]:
         """Return the drive's sound in each condition, with all contributions, for values of parameters by key."""
@@ -232,33 +252,22 @@ class LevelModel:
         """The conditions with the speed and torque that a changed fleet gives them, where it gave them before."""
         if not any(name.startswith(("train.", "operation.", "gear_pair.")) for name in values):
             return self.conditions
-        return tuple(_followed(condition, self.fleet, fleet) for condition in self.conditions)
+        return tuple(followed(condition, self.fleet, fleet) for condition in self.conditions)
 
     def _receivers(self, condition: Condition) -> tuple[Receiver, ...]:
         return tuple(dict.fromkeys(datum.receiver for datum in self.data if datum.condition == condition))
 
     def _motion(self, fleet: Fleet, values: Values) -> tuple[GearUnit, tuple[Motion, ...]]:
-        key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(DYNAMIC)))
+        dynamic = (*DYNAMIC, *OF_FOUNDATION) if self.fleet.model.coupling.value == "two_way" else DYNAMIC
+        key = tuple(sorted((name, value) for name, value in values.items() if name.startswith(dynamic)))
         known = self._computed.motions
         if key not in known:
-            model = DriveModel(fleet)
+            model = DriveModel(fleet, None, self.housing)
             states = [model.motion(condition) for condition in self._conditions(fleet, values)]
             forces = [bearing_forces(model.unit.system, state) if self._with_forces else None for state in states]
             held = zip(states, forces, strict=True)
             known[key] = model.unit, tuple((s.dte_pp_m, s.static_compression_m, of) for s, of in held)
         return known[key]
-
-
-def _followed(condition: Condition, before: Fleet, after: Fleet) -> Condition:
-    speed = condition.train_speed_km_h
-    motor_hz, torque_n_m = condition.motor_hz, condition.torque_n_m
-    if math.isclose(Kinematics.of(before).motor_hz_at_km_h(speed), motor_hz, rel_tol=1e-9):
-        motor_hz = Kinematics.of(after).motor_hz_at_km_h(speed)
-    try:
-        of_law = math.isclose(torque_at(before, speed), torque_n_m, rel_tol=1e-9)
-    except FleetError:  # there is no law: the runs state their torques
-        of_law = False
-    return replace(condition, motor_hz=motor_hz, torque_n_m=torque_at(after, speed) if of_law else torque_n_m)
 
 
 def _level_db(model: DriveModel, sources: Sequence[SoundSource], datum: MeasuredLevel) -> float:

@@ -15,6 +15,7 @@ from tdacoustic.fleet.parameter import Parameter
 from tdacoustic.fleet.radiation import Radiation
 from tdacoustic.fleet.sections import SCHEMA
 from tdacoustic.fleet.train import Train
+from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.fleet.write import fleet_toml
 
 __all__ = [
@@ -37,6 +38,7 @@ __all__ = [
     "Radiation",
     "StatedParameter",
     "Train",
+    "WhatIf",
     "fleet_toml",
     "load_fleet",
 ]

@@ -21,9 +21,13 @@ from tdacoustic.fleet.motor import Motor
 from tdacoustic.fleet.operation import Operation
 from tdacoustic.fleet.parameter import Parameter
 from tdacoustic.fleet.radiation import Radiation
-from tdacoustic.fleet.sections import SECTIONS, FleetFile
+from tdacoustic.fleet.sections import SECTIONS, STUDIES, FleetFile
 from tdacoustic.fleet.si import si_value
+from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
+from tdacoustic.fleet.study_problems import study_problems
 from tdacoustic.fleet.train import Train
+from tdacoustic.fleet.what_if import WhatIf
+from tdacoustic.fleet.what_if_problems import what_if_problems
 from tdacoustic.toml_models import Table, frozen, meta_lines
 
 __all__ = ["Fleet", "StatedParameter"]
@@ -70,6 +74,10 @@ class Fleet:
     radiation : Radiation
     meta : tuple of (str, str)
         ``[meta]`` in words.
+    sweep : tuple of DesignSweep
+    reference : tuple of Reference
+    feature : tuple of Feature
+    what_if : tuple of WhatIf
     """
 
     path: Path = field(compare=False)
@@ -84,6 +92,10 @@ class Fleet:
     housing: Housing | None
     radiation: Radiation
     meta: tuple[tuple[str, str], ...] = ()
+    sweep: tuple[DesignSweep, ...] = ()
+    reference: tuple[Reference, ...] = ()
+    feature: tuple[Feature, ...] = ()
+    what_if: tuple[WhatIf, ...] = ()
 
     @classmethod
     def of_tables(cls, path: Path, raw: Mapping[str, Any]) -> Fleet:
@@ -104,7 +116,8 @@ class Fleet:
         )
         sections = {name: getattr(file, name) for name in SECTIONS if name != "gear_pair"}
         meta = tuple(meta_lines(file.meta))
-        fleet = cls(path, file.name or path.parent.name or path.stem, gear_pair=pairs, meta=meta, **sections)
+        asked = {name: getattr(file, name) for name in STUDIES}
+        fleet = cls(path, file.name or path.parent.name or path.stem, gear_pair=pairs, meta=meta, **sections, **asked)
         problems = list(fleet._contradictions())
         if problems:
             raise fleet_error(path, problems)
@@ -117,6 +130,13 @@ class Fleet:
                 yield f"[[gear_pair]] {number}: the name {name!r} stands twice, also at {names.index(name) + 1}"
         if self.model.gear_pair is not None and self.model.gear_pair not in names:
             yield f"[model]: gear_pair must be one of {', '.join(names)}, got {self.model.gear_pair!r}"
+        if self.model.coupling.value == "two_way" and self.radiation.method.value != "boundary_elements":
+            yield (
+                '[model]: coupling = "two_way" needs [radiation] method = "boundary_elements", got '
+                f'"{self.radiation.method.value}": without it no housing is computed'
+            )
+        yield from study_problems(self)
+        yield from what_if_problems(self)
 
     @property
     def folder(self) -> Path:
@@ -267,7 +287,7 @@ class Fleet:
             changes = {key: place for key, (of, place) in entries.items() if of == whole and place}
             self._set(raw, whole, self._with_entries(whole, changes, values, deviations, origin))
         changed = Fleet.of_tables(self.path, {"name": self.name, **raw})
-        return replace(changed, meta=self.meta)
+        return replace(changed, meta=self.meta, **{name: getattr(self, name) for name in STUDIES})
 
     def _with_entries(
         self,

@@ -25,8 +25,8 @@ class Masuda(Table):
     weighting : Parameter of str
         ``"Z"`` or ``"A"``.
     position_m : Parameter of (float, float, float) or None
-        Of the free point source, in the drive frame. Default: the drive's centre; with boundary elements 0.1 m above
-        the middle of the housing's top.
+        Of the point source, in the drive frame. Default: the drive's centre; with boundary elements 0.1 m above the
+        middle of the housing's top where it is free, the pitch point between the shafts where it is inside.
     """
 
     constant_db: Parameter[float] = default(20.0, "paper, equation (8)")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Final, get_args, get_origin
@@ -21,13 +22,23 @@ from tdacoustic.fleet.operation import Operation
 from tdacoustic.fleet.parameter import PARAMETER_KEYS, Parameter
 from tdacoustic.fleet.radiation import Radiation
 from tdacoustic.fleet.sections import FleetFile
+from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
 from tdacoustic.fleet.train import Train
+from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import TOP_LEVEL, Vocabulary, file_error, joined, nearest, problem_words, shown
 
 __all__ = ["VOCABULARY", "fleet_error", "key_problem", "problem_lines", "table_of"]
 
 _ARRAYS: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
-    {"gear_pair": GearPair, "motor.excitation": MotorExcitation, "housing.seat": HousingSeat}
+    {
+        "gear_pair": GearPair,
+        "motor.excitation": MotorExcitation,
+        "housing.seat": HousingSeat,
+        "sweep": DesignSweep,
+        "reference": Reference,
+        "feature": Feature,
+        "what_if": WhatIf,
+    }
 )
 _TABLES: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
     {
@@ -153,6 +164,7 @@ def table_of(key: str) -> str:
     return _bracketed(name) if name else TOP_LEVEL
 
 
+@cache  # asked for at each look at a parameter
 def _parameter_names(model: type[BaseModel]) -> list[str]:
     """Return the keys of a table that hold a `Parameter`, not a name or a table."""
     kinds = {name: (field.annotation, *get_args(field.annotation)) for name, field in model.model_fields.items()}

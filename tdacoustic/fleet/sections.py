@@ -14,10 +14,12 @@ from tdacoustic.fleet.model import Model
 from tdacoustic.fleet.motor import Motor
 from tdacoustic.fleet.operation import Operation
 from tdacoustic.fleet.radiation import Radiation
+from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
 from tdacoustic.fleet.train import Train
+from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import Table, Text
 
-__all__ = ["SCHEMA", "SECTIONS", "FleetFile"]
+__all__ = ["SCHEMA", "SECTIONS", "STUDIES", "FleetFile"]
 
 SCHEMA: Final = "tdacoustic-fleet/1"
 """What ``schema`` has to say."""
@@ -37,7 +39,14 @@ class FleetFile(Table):
     motor: Motor | None = None
     housing: Housing | None = None
     radiation: Radiation = Radiation()
+    sweep: tuple[DesignSweep, ...] = ()
+    reference: tuple[Reference, ...] = ()
+    feature: tuple[Feature, ...] = ()
+    what_if: tuple[WhatIf, ...] = ()
 
 
-SECTIONS: Final = tuple(name for name in FleetFile.model_fields if name not in ("name", "meta"))
+STUDIES: Final = ("sweep", "reference", "feature", "what_if")
+"""Tables of what is asked of the model; they hold no parameters."""
+
+SECTIONS: Final = tuple(name for name in FleetFile.model_fields if name not in ("name", "meta", *STUDIES))
 """Names of the sections, in the order of the file."""

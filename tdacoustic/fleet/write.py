@@ -8,7 +8,9 @@ from typing import Any
 
 from tdacoustic.fleet.fleet import Fleet
 from tdacoustic.fleet.parameter import ASSUMED, Parameter
-from tdacoustic.fleet.sections import SCHEMA, SECTIONS
+from tdacoustic.fleet.sections import SCHEMA, SECTIONS, STUDIES
+from tdacoustic.fleet.studies import DesignSweep
+from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import Table
 
 __all__ = ["fleet_toml"]
@@ -33,7 +35,7 @@ def fleet_toml(fleet: Fleet) -> str:
     lines = [f"schema = {_text(SCHEMA)}", f"name = {_text(fleet.name)}"]
     if fleet.meta:
         lines += ["", "[meta]", *(f"{_text(key)} = {_text(value)}" for key, value in fleet.meta)]
-    for name in SECTIONS:
+    for name in (*SECTIONS, *STUDIES):
         section = getattr(fleet, name)
         for entry in section if isinstance(section, tuple) else () if section is None else (section,):
             lines += _table(entry, f"[[{name}]]" if isinstance(section, tuple) else f"[{name}]", name)
@@ -53,7 +55,9 @@ def _table(table: Table, header: str, name: str) -> Iterator[str]:
                 inner += _table(entry, f"[[{name}.{key}]]", f"{name}.{key}")
         elif isinstance(value, Parameter):
             yield f"{key} = {_parameter(value)}"
-        elif value not in (None, ()):
+        elif isinstance(table, DesignSweep | WhatIf) and key == "parameters" and value:
+            yield f"{key} = {{ {', '.join(f'{_text(of)} = {_value(values)}' for of, values in value)} }}"
+        elif value not in (None, (), ""):
             yield f"{key} = {_value(value)}"
     yield from inner
 

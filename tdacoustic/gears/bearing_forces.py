@@ -10,18 +10,18 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdacoustic.errors import GearError
 from tdacoustic.gears.steady_state import SteadyState
-from tdacoustic.gears.system import GearSystem
+from tdacoustic.gears.system import TRANSLATIONS, GearSystem
 
 __all__ = ["GEARS", "BearingForces", "bearing_forces", "sampling_points"]
 
 GEARS: Final = ("pinion", "wheel")
 
-_PLACES: Final = ((0, 1, 2), (4, 5, 6))
-
 
 @dataclass(frozen=True)
 class BearingForces:
     """Forces on the bearings of both gears, each the total of a gear's bearings: R = K x + C x'.
+
+    With a foundation x is the motion of a shaft against its seats.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class BearingForces:
 
 
 def bearing_forces(system: GearSystem, state: SteadyState) -> BearingForces:
-    """Return the bearing forces of a steady state: (K_j + iω C_j) X_j of each line.
+    """Return the bearing forces of a steady state: (K_j + iω C_j) of each bearing's deflection, line by line.
 
     Parameters
     ----------
@@ -81,15 +81,11 @@ def bearing_forces(system: GearSystem, state: SteadyState) -> BearingForces:
     state : SteadyState
     """
     lines = state.lines
-    omega = 2.0 * np.pi * lines.frequency_hz[:, None]
-    motion = -system.direction_vector * lines.force_n[:, None] / system.dynamic_stiffness(lines.frequency_hz)
-    force = (system.stiffness_matrix + 1j * omega * system.damping_matrix) * motion
-    mean = -system.direction_vector * state.mean_force_n
+    _, per_force = system.per_mesh_force(lines.frequency_hz)
+    force = per_force * lines.force_n[:, None]
+    mean = -system.direction_vector[TRANSLATIONS] * state.mean_force_n
     return BearingForces(
-        lines.frequency_hz,
-        lines.harmonic,
-        np.stack([force[:, place].T for place in _PLACES]),
-        np.stack([mean[list(place)] for place in _PLACES]),
+        lines.frequency_hz, lines.harmonic, np.stack([force[:, :3].T, force[:, 3:].T]), mean.reshape(2, 3)
     )
 
 

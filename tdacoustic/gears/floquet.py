@@ -24,7 +24,8 @@ def floquet_multipliers(system: GearSystem, mesh_hz: float, displacement_m: Real
     """Return the multipliers of a motion that repeats, largest first, shape (14,).
 
     The rigid rotation is not among them: its two unit multipliers (a Jordan block) are taken out by the reduction to
-    seven coordinates. A motion whose largest multiplier is beyond 1 is not what the gear does.
+    seven coordinates. A motion whose largest multiplier is beyond 1 is not what the gear does. With a foundation there
+    are two more for each of its modes, which are damped viscously here (`MeshPoles`).
 
     Parameters
     ----------
@@ -34,8 +35,6 @@ def floquet_multipliers(system: GearSystem, mesh_hz: float, displacement_m: Real
         δ over the mesh periods after which it repeats, from the start of a period; the samples of a period are a
         multiple of 4, as `samples_of_period` gives them.
     """
-    from tdacoustic.gears.kernels import monodromy
-
     sample_s = 1.0 / (displacement_m.shape[1] * mesh_hz)
     step_s = _SUBSAMPLES * sample_s
     stiffness, touching = _mesh_of_steps(system, displacement_m)
@@ -43,12 +42,21 @@ def floquet_multipliers(system: GearSystem, mesh_hz: float, displacement_m: Real
     if system.mesh_damping == "contact":
         damping *= touching
         stiffness += _kicks(system, displacement_m, sample_s) / step_s
-    reduced = system.reduced
-    matrix = monodromy(
-        stiffness, damping, step_s, reduced.direction, 1.0 / reduced.masses, reduced.stiffness, reduced.damping, _TERMS
-    )
-    values = np.linalg.eigvals(matrix)
+    if system.foundation is None:
+        values = np.linalg.eigvals(_monodromy(system, stiffness, damping, step_s))
+    else:
+        beyond = stiffness - system.mesh_stiffness_n_per_m, damping - system.mesh_damping_n_s_per_m
+        values = system.main_mesh_poles.multipliers(*beyond, step_s)
     return np.asarray(values[np.argsort(-np.abs(values))], dtype=np.complex128)
+
+
+def _monodromy(system: GearSystem, stiffness: Real, damping: Real, step_s: float) -> Real:
+    """Return what a repeat does to a small change of the state, on seats that do not move."""
+    from tdacoustic.gears.kernels import monodromy
+
+    reduced = system.reduced
+    masses, springs, dampers = 1.0 / reduced.masses, reduced.stiffness, reduced.damping
+    return np.asarray(monodromy(stiffness, damping, step_s, reduced.direction, masses, springs, dampers, _TERMS))
 
 
 def samples_of_period(system: GearSystem, mesh_hz: float) -> int:

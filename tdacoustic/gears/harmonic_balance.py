@@ -1,9 +1,9 @@
 """The periodic steady state as a scalar harmonic balance in δ.
 
-Everything but the mesh force is linear and diagonal, so δ_k + H(kω) F_k[δ] = 0 for k ≠ 0 and F_0 = T1/(r1 cos β_b)
-(physics.md section 2). While the teeth stay in contact F is linear in δ and one real system of 2N + 1 unknowns is the
-answer. With separation F_k comes from samples over one period (alternating frequency-time) and Newton's method starts
-from the solution of teeth that cannot separate.
+Everything but the mesh force is linear, a housing that gives way included, so δ_k + H(kω) F_k[δ] = 0 for k ≠ 0 and
+F_0 = T1/(r1 cos β_b) (physics.md section 2). While the teeth stay in contact F is linear in δ and one real system of
+2N + 1 unknowns is the answer. With separation F_k comes from samples over one period (alternating frequency-time) and
+Newton's method starts from the solution of teeth that cannot separate.
 """
 
 from __future__ import annotations
@@ -331,7 +331,7 @@ def _harmonics_needed(system: GearSystem, mesh_hz: float, mean_force_n: float) -
     """
     k = np.arange(1, MOST_HARMONICS + 1)
     force = np.abs(mean_force_n * system.contact_lines.fourier(MOST_HARMONICS)[1:])
-    receptance = np.abs(system.receptance_m_per_n(mesh_hz * k))
+    receptance = np.abs(system.on_rigid_seats.receptance_m_per_n(mesh_hz * k))
     added = receptance * force
     least = _left_out(system, FEWEST_HARMONICS)
     feedback = np.clip(receptance * system.mesh_stiffness_n_per_m, least, 1.0)

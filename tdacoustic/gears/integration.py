@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,15 @@ from numpy.typing import NDArray
 from tdacoustic.errors import GearError
 from tdacoustic.gears.system import GearSystem
 
-__all__ = ["LONGEST_REPEAT", "MOST_PERIODS", "TimeSolution", "integrate", "settle", "static_state"]
+__all__ = [
+    "LONGEST_REPEAT",
+    "MOST_PERIODS",
+    "TimeSolution",
+    "integrate",
+    "real_state",
+    "settle",
+    "static_state",
+]
 
 Real = NDArray[np.float64]
 
@@ -53,8 +61,9 @@ class TimeSolution:
         δ and F at equal steps of the last mesh periods: as many as the motion takes to repeat, or `RECORD_PERIODS`.
     repeats_after : int or None
         Mesh periods after which the motion repeats; None where it does not.
-    state : ndarray, shape (14,)
-        At the end: displacements and velocities of the seven coordinates of `ReducedSystem`.
+    state : ndarray, shape (14,) or more
+        At the end: displacements and velocities of the seven coordinates of `ReducedSystem`. With a foundation, the
+        real and then the imaginary parts of the vibrations of `MeshPoles`.
     periods : int
         Mesh periods that were integrated.
     """
@@ -71,33 +80,62 @@ class _March:
     """Integrates block by block."""
 
     def __init__(self, system: GearSystem, mesh_hz: float, torque_n_m: float, steps: int | None) -> None:
-        reduced = system.reduced
-        turning = 2.0 * math.pi * system.fastest_hz / mesh_hz
+        moving = system.foundation is not None
+        fastest_hz = max(system.fastest_hz, system.mesh_poles.fastest_hz if moving else 0.0)
+        turning = 2.0 * math.pi * fastest_hz / mesh_hz
         self.steps = steps or max(_FEWEST_STEPS, 16 * math.ceil(turning / _RADIANS_PER_STEP / 16))
         half_steps = np.arange(2 * self.steps) / (2 * self.steps)
         self._stiffness = system.mesh_stiffness_n_per_m * system.contact_lines.relative(half_steps)
         self._error = system.transmission_error_at(half_steps)
         self._step_s = 1.0 / (mesh_hz * self.steps)
-        drive = np.zeros(7)
-        drive[6] = torque_n_m / system.base_radii_m[0]
-        self._arrays = (reduced.direction, 1.0 / reduced.masses, reduced.stiffness, reduced.damping, drive)
         needs_contact = 1.0 if system.mesh_damping == "contact" else 0.0
-        self._mesh = np.array([system.mesh_damping_n_s_per_m, system.half_backlash_m, needs_contact])
+        mesh = [system.mesh_damping_n_s_per_m, system.half_backlash_m, needs_contact]
+        self._is_of_poles = moving
+        self._arrays: tuple[NDArray[Any], ...]
+        if moving:
+            held = system.mesh_poles
+            self._arrays = (held.poles, held.driven, held.felt, held.turned * torque_n_m)
+            self._mesh = np.array([*mesh, system.mesh_stiffness_n_per_m])
+        else:
+            reduced, drive = system.reduced, np.zeros(7)
+            drive[6] = torque_n_m / system.base_radii_m[0]
+            self._arrays = (reduced.direction, 1.0 / reduced.masses, reduced.stiffness, reduced.damping, drive)
+            self._mesh = np.array(mesh)
 
     def run(self, state: Real, periods: int) -> tuple[Real, Real]:
         """Integrate from a state, which becomes the end; return δ and F, shape (periods, steps)."""
-        from tdacoustic.gears.kernels import march
+        from tdacoustic.gears.kernels import march, march_of_poles
 
         deltas, forces = np.empty((periods, self.steps)), np.empty((periods, self.steps))
-        march(state, periods, self._stiffness, self._error, self._step_s, *self._arrays, self._mesh, deltas, forces)
+        given = self._stiffness, self._error, self._step_s, *self._arrays, self._mesh, deltas, forces
+        if self._is_of_poles:
+            vibrations = complex_state(state)
+            march_of_poles(vibrations, periods, *given)
+            state[:] = real_state(vibrations)
+        else:
+            march(state, periods, *given)
         if not np.isfinite(state).all():
             raise GearError(f"the time integration at {1.0 / (self._step_s * self.steps):.6g} Hz left all bounds")
         return deltas, forces
 
 
+def real_state(vibrations: NDArray[np.complex128]) -> Real:
+    """Return the vibrations of `MeshPoles` as real numbers: real parts, then imaginary ones."""
+    return np.concatenate([vibrations.real, vibrations.imag])
+
+
+def complex_state(state: Real) -> NDArray[np.complex128]:
+    """Return the vibrations that `real_state` took apart."""
+    half = state.size // 2
+    return np.asarray(state[:half] + 1j * state[half:])
+
+
 def static_state(system: GearSystem, torque_n_m: float) -> Real:
-    """Return the state of rest under a torque with the mesh at its mean stiffness, shape (14,)."""
+    """Return the state of rest under a torque with the mesh at its mean stiffness, as `TimeSolution` has it."""
     force = system.mean_force_n(torque_n_m)
+    if system.foundation is not None:
+        side = math.copysign(system.half_backlash_m, force) if force else 0.0
+        return real_state(system.mesh_poles.at_rest(-system.mesh_stiffness_n_per_m * side, torque_n_m))
     reduced = system.reduced
     state = np.zeros(14)
     state[:6] = -reduced.direction[:6] * force / reduced.stiffness[:6]
@@ -124,8 +162,8 @@ def integrate(
     torque_n_m : float
         On the pinion; the wheel's balances it.
     periods : int
-    start : ndarray, shape (14,), optional
-        Default: `static_state`.
+    start : ndarray, shape (14,) or more, optional
+        As `TimeSolution` has it. Default: `static_state`.
     steps : int, optional
         Of a mesh period. Default: 0.06 rad of the fastest natural frequency.
 

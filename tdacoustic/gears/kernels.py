@@ -1,7 +1,8 @@
 """Compiled loops: the equations in time, and their monodromy matrix.
 
 This module imports numba; others import it where they use it. Arrays are of the seven coordinates of
-`tdacoustic.gears.system.ReducedSystem`; a state is their displacements and then their velocities.
+`tdacoustic.gears.system.ReducedSystem`; a state is their displacements and then their velocities. On a foundation they
+are of the vibrations of `tdacoustic.gears.mesh_poles.MeshPoles`.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["march", "monodromy"]
+__all__ = ["march", "march_of_poles", "monodromy"]
 
 Real = NDArray[np.float64]
 
@@ -152,3 +153,74 @@ def monodromy(mesh_stiffness, mesh_damping, step_s, direction, inverse_mass, sti
                     whole[row, column] += following[row, column]
                     term[row, column] = following[row, column]
     return whole
+
+
+@_compiled
+def _rates_of_poles(state, rate, stiffness_now, error_now, poles, driven, felt, steady, mesh):  # type: ignore[no-untyped-def]
+    """Write the time derivative of the vibrations and return δ and the mesh force.
+
+    `mesh` is (c_m, b, 1 if c_m needs contact, k̄); the vibrations hold k̄ and c_m, the rest of the force drives them.
+    """
+    delta, speed = 0.0, 0.0
+    for j in range(poles.size):
+        part = felt[j] * state[j]
+        delta += part.real
+        speed += (part * poles[j]).real
+    gap = delta - error_now
+    touching, force = True, 0.0
+    if gap > mesh[1]:
+        force = stiffness_now * (gap - mesh[1])
+    elif gap < -mesh[1]:
+        force = stiffness_now * (gap + mesh[1])
+    else:
+        touching = False
+    if touching or mesh[2] == 0.0:
+        force += mesh[0] * speed
+    beyond = force - mesh[3] * delta - mesh[0] * speed
+    for j in range(poles.size):
+        rate[j] = poles[j] * state[j] + driven[j] * beyond + steady[j]
+    return delta, force
+
+
+@_compiled
+def march_of_poles(  # type: ignore[no-untyped-def]
+    state, periods, stiffness_half_steps, error_half_steps, step_s, poles, driven, felt, steady, mesh, deltas, forces
+):
+    """Integrate whole mesh periods of the vibrations with the classical Runge-Kutta method of fourth order.
+
+    Parameters
+    ----------
+    state : ndarray of complex, shape (n,)
+        Start; overwritten with the end.
+    periods, stiffness_half_steps, error_half_steps, step_s, deltas, forces
+        As of `march`.
+    poles, driven, felt : ndarray of complex, shape (n,)
+        λ, b and c of `MeshPoles`.
+    steady : ndarray of complex, shape (n,)
+        t T1.
+    mesh : ndarray, shape (4,)
+        c_m, b, 1 where c_m needs contact, and k̄.
+    """
+    n, steps = poles.size, stiffness_half_steps.size // 2
+    k1, k2, k3 = np.empty(n, np.complex128), np.empty(n, np.complex128), np.empty(n, np.complex128)
+    k4, trial = np.empty(n, np.complex128), np.empty(n, np.complex128)
+    for period in range(periods):
+        for step in range(steps):
+            here, between, following = 2 * step, 2 * step + 1, (2 * step + 2) % (2 * steps)
+            k, e = stiffness_half_steps[here], error_half_steps[here]
+            delta, force = _rates_of_poles(state, k1, k, e, poles, driven, felt, steady, mesh)
+            deltas[period, step] = delta
+            forces[period, step] = force
+            for j in range(n):
+                trial[j] = state[j] + 0.5 * step_s * k1[j]
+            k, e = stiffness_half_steps[between], error_half_steps[between]
+            _rates_of_poles(trial, k2, k, e, poles, driven, felt, steady, mesh)
+            for j in range(n):
+                trial[j] = state[j] + 0.5 * step_s * k2[j]
+            _rates_of_poles(trial, k3, k, e, poles, driven, felt, steady, mesh)
+            for j in range(n):
+                trial[j] = state[j] + step_s * k3[j]
+            k, e = stiffness_half_steps[following], error_half_steps[following]
+            _rates_of_poles(trial, k4, k, e, poles, driven, felt, steady, mesh)
+            for j in range(n):
+                state[j] += step_s / 6.0 * (k1[j] + 2.0 * k2[j] + 2.0 * k3[j] + k4[j])

@@ -13,11 +13,18 @@ from numpy.typing import NDArray
 from tdacoustic.errors import GearError
 from tdacoustic.gears.floquet import floquet_multipliers, samples_of_period
 from tdacoustic.gears.harmonic_balance import HarmonicSolution, periodic_solution
-from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, TimeSolution, integrate, settle
+from tdacoustic.gears.integration import (
+    LONGEST_REPEAT,
+    MOST_PERIODS,
+    TimeSolution,
+    integrate,
+    real_state,
+    settle,
+)
 from tdacoustic.gears.lines import Lines, lines_of_harmonics, lines_of_record, lines_of_repeat
 from tdacoustic.gears.system import GearSystem
 
-__all__ = ["STABLE", "SteadyState", "steady_state"]
+__all__ = ["STABLE", "SteadyState", "balanced_state", "steady_state"]
 
 STABLE: Final = 1.0 + 1e-6
 """Largest Floquet multiplier of a solution that is taken; beyond it the time integration takes over. Without any
@@ -61,8 +68,9 @@ class SteadyState:
         Of F.
     waveform_m : ndarray, shape (periods, samples)
         δ over the mesh periods of one repeat, or the first ones of the record.
-    state : ndarray, shape (14,)
-        Displacements and velocities of the seven coordinates of `ReducedSystem` as a mesh period begins.
+    state : ndarray, shape (14,) or more
+        As a mesh period begins, in the coordinates of `TimeSolution`. Empty where the balance found the motion of gears
+        on a foundation: there it follows from the lines.
     residual : float
         Of the harmonic balance over its scale; NaN where it did not produce the motion.
     """
@@ -134,13 +142,30 @@ def steady_state(
     found = _first_stable(system, mesh_hz, force, start)
     if found is not None and found[1] <= STABLE:
         return _of_balance(system, torque_n_m, *found)
-    state = start.state if start is not None and start.method != "at_rest" else None
+    state = _state_at(system, start) if start is not None and start.method != "at_rest" else None
     settled = settle(system, mesh_hz, torque_n_m, state, most_periods)
     again = _from_time(system, force, settled)
     if again is not None and again[1] <= STABLE and (start is None or settled.repeats_after == 1):
         return _of_balance(system, torque_n_m, *again)
     unstable = next((pair for pair in (again, found) if pair is not None and pair[1] > STABLE), None)
     return _of_time(system, torque_n_m, settled, unstable)
+
+
+def balanced_state(system: GearSystem, mesh_hz: float, torque_n_m: float) -> SteadyState | None:
+    """Return the stable motion that the harmonic balance reaches from teeth that cannot separate, or None of none.
+
+    Nothing is integrated in time, so it takes milliseconds whatever the gears do.
+
+    Parameters
+    ----------
+    system, mesh_hz, torque_n_m
+        As of `steady_state`.
+    """
+    if torque_n_m == 0.0:
+        return _at_rest(system, mesh_hz)
+    solution = periodic_solution(system, mesh_hz, system.mean_force_n(torque_n_m))
+    judged = None if solution is None else _judged(system, solution)
+    return _of_balance(system, torque_n_m, *judged) if judged is not None and judged[1] <= STABLE else None
 
 
 Judged: TypeAlias = tuple[HarmonicSolution, float]
@@ -178,6 +203,10 @@ def _starts(
             yield np.fft.rfft(start.waveform_m[0], norm="forward")
         return
     yield None
+    if system.foundation is not None:
+        beside = periodic_solution(system.on_rigid_seats, mesh_hz, force)
+        if beside is not None:
+            yield beside.displacement_m
     torque_n_m = force * system.base_radii_m[0] * math.cos(system.base_helix_angle_rad)
     first = integrate(system, mesh_hz, torque_n_m, FIRST_PERIODS)
     yield np.fft.rfft(first.displacement_m[-1], norm="forward")
@@ -223,6 +252,8 @@ def _of_balance(system: GearSystem, torque_n_m: float, solution: HarmonicSolutio
 
 def _state_of(system: GearSystem, solution: HarmonicSolution) -> NDArray[np.float64]:
     """Return the state as the mesh period begins."""
+    if system.foundation is not None:
+        return np.zeros(0)
     lines = lines_of_harmonics(solution.mesh_hz, solution.force_n)
     reduced = system.reduced
     motion = reduced.response(lines.force_n, lines.frequency_hz)
@@ -233,6 +264,17 @@ def _state_of(system: GearSystem, solution: HarmonicSolution) -> NDArray[np.floa
     state[:7] += motion.real.sum(axis=0)
     state[7:] = (2.0j * np.pi * lines.frequency_hz[:, None] * motion).real.sum(axis=0)
     return state
+
+
+def _state_at(system: GearSystem, steady: SteadyState) -> NDArray[np.float64]:
+    """Return the state as a mesh period begins; on a foundation what the mesh force beyond bonded teeth makes of it."""
+    if steady.state.size:
+        return steady.state
+    held, lines = system.mesh_poles, steady.lines
+    bonded = system.mesh_stiffness_n_per_m + 2j * np.pi * lines.frequency_hz * system.mesh_damping_n_s_per_m
+    beyond = lines.force_n * (1.0 + bonded * system.receptance_m_per_n(lines.frequency_hz))
+    mean = steady.mean_force_n - system.mesh_stiffness_n_per_m * steady.mean_displacement_m
+    return real_state(held.at_rest(mean, steady.torque_n_m) + held.response(beyond, lines.frequency_hz))
 
 
 def _of_time(system: GearSystem, torque_n_m: float, settled: TimeSolution, unstable: Judged | None) -> SteadyState:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Final, Literal
 
@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from tdacoustic.errors import GearError
 from tdacoustic.gears.contact_lines import ContactLines
+from tdacoustic.gears.foundation import Foundation
+from tdacoustic.gears.mesh_poles import LEAST_PART, MeshPoles
 
 __all__ = ["DIRECTIONS", "FREEDOMS", "GearSystem"]
 
@@ -22,6 +24,9 @@ FREEDOMS: Final = ("x1", "y1", "z1", "theta1", "x2", "y2", "z2", "theta2")
 """Node 1 is the pinion, node 2 the wheel; both rotations are positive in the same sense."""
 
 Six = tuple[float, float, float, float, float, float]
+
+TRANSLATIONS: Final = [0, 1, 2, 4, 5, 6]
+"""Places of the six translations among the `FREEDOMS`."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,8 @@ class GearSystem:
         Amplitudes of the sines at mesh harmonics 1, 2, ..., phase 0.
     mesh_damping : {"always", "contact"}
         Whether c_m acts always, as the paper prints it, or only while teeth touch.
+    foundation : Foundation, optional
+        What the bearings stand on. Default: seats that do not move.
 
     Raises
     ------
@@ -70,6 +77,7 @@ class GearSystem:
     half_backlash_m: float
     transmission_error_m: tuple[float, ...]
     mesh_damping: Literal["always", "contact"] = "always"
+    foundation: Foundation | None = None
 
     def __post_init__(self) -> None:
         for name in ("masses_kg", "inertias_kg_m2", "base_radii_m", "bearing_stiffness_n_per_m"):
@@ -134,9 +142,24 @@ class GearSystem:
         return 2.0 * self.mesh_damping_ratio * math.sqrt(self.mesh_stiffness_n_per_m * self.equivalent_mass_kg)
 
     @cached_property
+    def on_rigid_seats(self) -> GearSystem:
+        """The same gears on seats that do not move."""
+        return self if self.foundation is None else replace(self, foundation=None)
+
+    @cached_property
     def reduced(self) -> ReducedSystem:
-        """The same motion without its rigid rotation."""
+        """The same motion without its rigid rotation, on seats that do not move."""
         return ReducedSystem.of(self)
+
+    @cached_property
+    def mesh_poles(self) -> MeshPoles:
+        """The motion in time of gears on a foundation, with all its modes."""
+        return MeshPoles.of(self, 0.0)
+
+    @cached_property
+    def main_mesh_poles(self) -> MeshPoles:
+        """The same with those modes that the mesh feels, for multipliers."""
+        return MeshPoles.of(self, LEAST_PART)
 
     @cached_property
     def transmission_error_pp_m(self) -> float:
@@ -164,22 +187,60 @@ class GearSystem:
         return torque_n_m / (self.base_radii_m[0] * math.cos(self.base_helix_angle_rad))
 
     def receptance_m_per_n(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return H = Σ V_j² / (K_j - ω² M_j + iω C_j), at frequencies above zero: δ = -H F without a mesh."""
-        return np.asarray((self.direction_vector**2 / self.dynamic_stiffness(frequency_hz)).sum(axis=-1))
+        """Return H at frequencies above zero: δ = -H F without a mesh.
+
+        H = Σ V_j² / (K_j - ω² M_j + iω C_j) on seats that do not move; else V_j² of the rotations, and of the
+        translations V·x of `per_mesh_force`.
+        """
+        if self.foundation is None:
+            return np.asarray((self.direction_vector**2 / self.dynamic_stiffness(frequency_hz)).sum(axis=-1))
+        omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64)
+        turning = -(math.cos(self.base_helix_angle_rad) ** 2) / (omega**2 * self.equivalent_mass_kg)
+        moved, _ = self.per_mesh_force(np.atleast_1d(frequency_hz))
+        return np.asarray(turning - (moved @ self.direction_vector[TRANSLATIONS]).reshape(omega.shape))
+
+    def per_mesh_force(
+        self, frequency_hz: NDArray[np.float64]
+    ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+        """Return x, y, z of pinion and wheel, and the forces on their bearings, per mesh force, shape (n, 6) each.
+
+        A bearing is a spring and a damper Z = K + iωC between the shaft and a seat that moves by S under the forces on
+        all seats. With A = Z⁻¹ + S the bearing force is R = A⁻¹ x, and R - ω² M x = -V F gives R = -(1 - ω² M A)⁻¹ V F.
+
+        Parameters
+        ----------
+        frequency_hz : ndarray, shape (n,)
+            Above zero.
+        """
+        direction = self.direction_vector[TRANSLATIONS]
+        omega = 2.0 * np.pi * frequency_hz[:, None]
+        bearing = self.stiffness_matrix[TRANSLATIONS] + 1j * omega * self.damping_matrix[TRANSLATIONS]
+        if self.foundation is None:
+            still = np.asarray(-direction / self.dynamic_stiffness(frequency_hz)[:, TRANSLATIONS])
+            return still, np.asarray(bearing * still)
+        flexible = self.foundation.compliance_m_per_n(frequency_hz)
+        diagonal = np.arange(6)
+        flexible[:, diagonal, diagonal] += 1.0 / bearing
+        inertia = omega**2 * self.mass_matrix[TRANSLATIONS]
+        pushed = np.tile(-direction, (len(omega), 1))[..., None]
+        force = np.linalg.solve(np.eye(6) - inertia[:, :, None] * flexible, pushed)
+        return np.asarray((flexible @ force)[..., 0]), np.asarray(force[..., 0])
 
     def dynamic_stiffness(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Return K_j - ω² M_j + iω C_j of each of the `FREEDOMS`, shape (..., 8)."""
+        """Return K_j - ω² M_j + iω C_j of each of the `FREEDOMS` on seats that do not move, shape (..., 8)."""
         omega = 2.0 * np.pi * np.asarray(frequency_hz, dtype=np.float64)[..., None]
         return np.asarray(self.stiffness_matrix - omega**2 * self.mass_matrix + 1j * omega * self.damping_matrix)
 
     @cached_property
     def fastest_hz(self) -> float:
-        """Highest natural frequency in Hz with the mesh at its stiffest."""
+        """Highest natural frequency in Hz with the mesh at its stiffest, on seats that do not move."""
         peak = float(self.contact_lines.relative(np.linspace(0.0, 1.0, 65)).max())
         return float(self.natural_frequencies_hz(peak * self.mesh_stiffness_n_per_m)[-1])
 
     def natural_frequencies_hz(self, mesh_stiffness_n_per_m: float | None = None) -> NDArray[np.float64]:
-        """Return the undamped natural frequencies in Hz, ascending, shape (8,); the rigid rotation is at 0.
+        """Return the undamped natural frequencies on seats that do not move in Hz, ascending, shape (8,).
+
+        The rigid rotation is at 0.
 
         Parameters
         ----------

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tdacoustic.housing.plane_grid import missing_ngsolve
 from tdacoustic.housing.solid_grid import SolidGrid
 
-__all__ = ["ORDER", "THROUGH", "Structure", "structure_of"]
+__all__ = ["ORDER", "THROUGH", "Structure", "assembled", "structure_of"]
 
 ORDER: Final = 4
 """Polynomial order along the walls."""
@@ -130,7 +130,35 @@ def structure_of(
         raise missing_ngsolve() from None
     ngsolve.ngsglobals.msg_level = 0
     solid = _ngsolve_grid(grid)
-    space, scalar = (_space(solid, grid, order, directions) for directions in (3, 1))
+    spaces = (_space(solid, grid, order, 3), _space(solid, grid, order, 1))
+    return assembled(solid, spaces, modulus_pa, poisson, density_kg_m3, springs_n_per_m or {}, loaded)
+
+
+def assembled(
+    solid: Any,
+    spaces: tuple[Any, Any],
+    modulus_pa: float,
+    poisson: float,
+    density_kg_m3: float,
+    springs_n_per_m: Mapping[str, tuple[float, float, float]],
+    loaded: tuple[str, ...] = (),
+) -> Structure:
+    """Return the matrices of a solid on a grid of NGSolve; parameters as of `structure_of`, where they are the same.
+
+    Parameters
+    ----------
+    solid : ngsolve.Mesh
+        Its materials and boundaries are the parts and faces.
+    spaces : (ngsolve.H1, ngsolve.H1)
+        Of the displacements, three directions, and of one direction of them, with the same orders.
+    modulus_pa, poisson, density_kg_m3 : float
+    springs_n_per_m : mapping
+    loaded : tuple of str
+    """
+    import ngsolve
+
+    space, scalar = spaces
+    parts = frozenset(solid.GetMaterials())
     u, v = space.TnT()
     lame_2 = 0.5 * modulus_pa / (1.0 + poisson)
     lame_1 = 2.0 * lame_2 * poisson / (1.0 - 2.0 * poisson)
@@ -139,10 +167,10 @@ def structure_of(
     energy = 2.0 * lame_2 * ngsolve.InnerProduct(strain_u, strain_v)
     stiffness += (energy + lame_1 * ngsolve.Trace(strain_u) * ngsolve.Trace(strain_v)) * ngsolve.dx
     mass += density_kg_m3 * u * v * ngsolve.dx
-    for name, springs in (springs_n_per_m or {}).items():
-        region = (solid.Materials if name in grid.part_names else solid.Boundaries)(name)
+    for name, springs in springs_n_per_m.items():
+        region = (solid.Materials if name in parts else solid.Boundaries)(name)
         size = ngsolve.Integrate(1.0, solid, definedon=region)
-        measure = (ngsolve.dx if name in grid.part_names else ngsolve.ds)(definedon=region)
+        measure = (ngsolve.dx if name in parts else ngsolve.ds)(definedon=region)
         for axis, spring in enumerate(springs):
             stiffness += spring / size * u[axis] * v[axis] * measure
     loads = []

@@ -18,10 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.gears import GEARS, BearingForces
-from tdacoustic.housing.box import SEAT_PLACES, Box
+from tdacoustic.gears import GEARS, BearingForces, Foundation
+from tdacoustic.housing.box import SEAT_PLACES
+from tdacoustic.housing.response import SeatResponse
+from tdacoustic.housing.seated import Seated
 
-__all__ = ["gear_axes", "mean_seat_loads", "seat_loads"]
+__all__ = ["foundation_of", "gear_axes", "mean_seat_loads", "seat_loads"]
 
 
 def gear_axes(pinion_xz_m: tuple[float, float], wheel_xz_m: tuple[float, float]) -> NDArray[np.float64]:
@@ -50,7 +52,7 @@ def gear_axes(pinion_xz_m: tuple[float, float], wheel_xz_m: tuple[float, float])
     return np.column_stack([centres, np.cross(shafts, centres), shafts])
 
 
-def _on_seats(box: Box, forces: NDArray[Any]) -> NDArray[Any]:
+def _on_seats(box: Seated, forces: NDArray[Any]) -> NDArray[Any]:
     """Forces of the gears' bearings, shape (2, 3, ...), on the four seats in the drive frame, shape (4, 3, ...)."""
     axes = gear_axes(box.seats[0].centre_m, box.seats[1].centre_m)
     shares = []
@@ -61,18 +63,18 @@ def _on_seats(box: Box, forces: NDArray[Any]) -> NDArray[Any]:
     return np.stack(shares)
 
 
-def seat_loads(box: Box, forces: BearingForces) -> NDArray[np.complex128]:
+def seat_loads(box: Seated, forces: BearingForces) -> NDArray[np.complex128]:
     """Return the forces that the bearings put on the housing, line by line.
 
     The bearing force R = K x + C x' of the gears' model (physics.md section 3) is the force of the shaft on what holds
-    it: it acts on the housing with its own sign. It is computed for a foundation that does not move (one-way coupling).
+    it: it acts on the housing with its own sign. In one-way coupling it is that on a foundation that does not move.
     Each gear's force, axial force included, is split between its two bearings by the lever rule for where the gear
     stands (`Seat.gear_y_m`; in the middle: half each). In truth one bearing may hold a shaft axially alone, and the
     axial force tilts it; both are left out.
 
     Parameters
     ----------
-    box : Box
+    box : Box or SolidHousing
     forces : BearingForces
 
     Returns
@@ -83,6 +85,26 @@ def seat_loads(box: Box, forces: BearingForces) -> NDArray[np.complex128]:
     return np.asarray(_on_seats(box, forces.amplitude_n), dtype=np.complex128)
 
 
-def mean_seat_loads(box: Box, forces: BearingForces) -> NDArray[np.float64]:
+def mean_seat_loads(box: Seated, forces: BearingForces) -> NDArray[np.float64]:
     """Return the mean forces on the seats in N, shape (4, 3): as `seat_loads`, of the mean."""
     return np.asarray(_on_seats(box, forces.mean_n), dtype=np.float64)
+
+
+def foundation_of(box: Seated, modes: SeatResponse, loss_factor: float) -> Foundation:
+    """Return the housing as the gears feel it: the motion under each gear's bearings, by mode.
+
+    By virtual work the displacement that a gear's bearing force sees is the mean of its two seats, weighted with the
+    shares of `seat_loads`; so the compliance is symmetric, and the power that the gears give is the power that the
+    housing takes. The springs of the modes are those between housing and frame (soft: `Seat`, `Box`); the bearings
+    between shafts and seats are in the gears' equations alone, so that nothing is counted twice.
+
+    Parameters
+    ----------
+    box : Box or SolidHousing
+        With the places of the gears along the shafts.
+    modes : HousingModes or SolidModes
+    loss_factor : float
+    """
+    unit = np.eye(6).reshape(2, 3, 6)
+    shapes = np.einsum("msd,sdj->mj", modes.seats, _on_seats(box, unit))
+    return Foundation(modes.frequency_hz, shapes, loss_factor, corrections=len(modes.frequency_hz) - modes.natural)

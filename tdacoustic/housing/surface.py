@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from tdacoustic.housing.box import HousingError
 from tdacoustic.housing.solid_grid import PANELS
 
-__all__ = ["PanelNodes", "lattice", "panel_nodes", "read_only"]
+__all__ = ["PanelNodes", "lagrange_at", "lattice", "panel_nodes", "read_only"]
 
 Real = NDArray[np.float64]
 Whole = NDArray[np.int64]
@@ -128,7 +128,7 @@ class PanelNodes:
                 f"the point {points[off][0]} m with its normal along {'-' if sign < 0 else '+'}{axis} is not on that "
                 f"panel of the housing, at {axis} = {place:g} m"
             )
-        return triangles[chosen], _lagrange(within, self.order)
+        return triangles[chosen], lagrange_at(within, self.order)
 
     @property
     def _corners(self) -> list[int]:
@@ -137,7 +137,7 @@ class PanelNodes:
         return [nodes.index([self.order * (corner == k) for k in range(3)]) for corner in range(3)]
 
 
-def _lagrange(shares: Real, order: int) -> Real:
+def lagrange_at(shares: Real, order: int) -> Real:
     """Return the Lagrange polynomials of a triangle at barycentric coordinates, shape (points, nodes)."""
     factors = np.ones((*shares.shape, order + 1))
     for degree in range(1, order + 1):

@@ -1,4 +1,4 @@
-"""A box in air with what stands beside it: the setting of transfer vectors."""
+"""A box in air with what stands beside it."""
 
 from __future__ import annotations
 
@@ -6,37 +6,22 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import TYPE_CHECKING, Any, Final
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
-
-from tdacoustic.errors import RadiationError
+from tdacoustic.radiation.body_in_air import (
+    COARSEST_GRID_HZ,
+    LEAST_ELEMENTS_PER_WAVELENGTH,
+    BodyInAir,
+)
 from tdacoustic.radiation.grids import box_surface
 from tdacoustic.radiation.surfaces import Axis, Surface
-
-if TYPE_CHECKING:
-    from tdacoustic.radiation.multipoles import Multipoles
 
 __all__ = ["COARSEST_GRID_HZ", "LEAST_ELEMENTS_PER_WAVELENGTH", "BoxInAir"]
 
 Point = tuple[float, float, float]
-Complex = NDArray[np.complexfloating[Any, Any]]
-
-LEAST_ELEMENTS_PER_WAVELENGTH: Final = 5.0
-
-_NEAR: Final = 1.5
-"""Receivers nearer than this many radii of the enclosing sphere are computed without multipoles."""
-
-_MOST_BYTES: Final = 6e9
-
-COARSEST_GRID_HZ: Final = 1000.0
-"""Highest frequency of the coarsest grid, which carries all lower ones too, because it must resolve the modes."""
 
 
 @dataclass(frozen=True)
-class BoxInAir:
+class BoxInAir(BodyInAir):
     """A box, the air around it, point sources beside it and receivers close to it.
 
     Parameters
@@ -67,142 +52,37 @@ class BoxInAir:
     elements_per_wavelength: float = 7.5
 
     def __post_init__(self) -> None:
-        if not self.elements_per_wavelength >= LEAST_ELEMENTS_PER_WAVELENGTH:
-            raise RadiationError(
-                f"elements_per_wavelength must be at least {LEAST_ELEMENTS_PER_WAVELENGTH:g}, "
-                f"got {self.elements_per_wavelength:g}"
-            )
-        lowest = self.position_m[2] - 0.5 * self.extent_m[2]
-        if self.ground_m is not None and not lowest > self.ground_m:
-            raise RadiationError(
-                f"the housing reaches down to z = {lowest:.4g} m, the ground is at {self.ground_m:.4g} m"
-            )
-
-    @property
-    def centre_m(self) -> Point:
-        """Of the multipoles: the drive's centre, over ground the point of the ground below it."""
-        return (0.0, 0.0, 0.0 if self.ground_m is None else self.ground_m)
-
-    @cached_property
-    def radius_m(self) -> float:
-        """Of the sphere around `centre_m` that encloses the box."""
-        corners = itertools.product(*((p - 0.5 * e, p + 0.5 * e) for p, e in self._axes))
-        return max(math.dist(corner, self.centre_m) for corner in corners)
+        self.check()
 
     @property
     def _axes(self) -> list[tuple[float, float]]:
         return list(zip(self.position_m, self.extent_m, strict=True))
 
-    def wave_number_rad_m(self, frequency_hz: float) -> float:
-        """Return k = ω/c."""
-        return 2.0 * math.pi * frequency_hz / self.sound_speed_m_s
+    @property
+    def ends_m(self) -> tuple[Point, Point]:
+        """Lowest and highest x, y, z of the box."""
+        (x0, x1), (y0, y1), (z0, z1) = ((p - 0.5 * e, p + 0.5 * e) for p, e in self._axes)
+        return (x0, y0, z0), (x1, y1, z1)
+
+    @property
+    def mirrors(self) -> tuple[Axis, ...]:
+        """The planes through its middle; over ground the upright ones."""
+        return ("x", "y", "z") if self.ground_m is None else ("x", "y")
 
     def distance_m(self, point_m: Sequence[float]) -> float:
         """Return how far a point is from the box; 0 in it or on it."""
         return math.hypot(*(max(abs(x - p) - 0.5 * e, 0.0) for x, (p, e) in zip(point_m, self._axes, strict=True)))
 
-    @property
-    def reach(self) -> str:
-        """The box's ends along each axis, in words."""
-        ends = [
-            f"{name} {p - 0.5 * e:.4g} to {p + 0.5 * e:.4g} m" for name, (p, e) in zip("xyz", self._axes, strict=True)
-        ]
-        return ", ".join(ends)
-
-    def is_near(self, point_m: Sequence[float]) -> bool:
-        """Whether a point is too close for multipoles."""
-        return math.dist(point_m, self.centre_m) < _NEAR * self.radius_m
-
-    def surface(self, grid_hz: float) -> Surface:
-        """Return the grid that carries frequencies up to one.
-
-        Raises
-        ------
-        RadiationError
-            It would take more memory than there may be.
-        """
-        self.check_grid(grid_hz)
-        return box_surface(self.extent_m, self._largest_panel_m(grid_hz), self._mirrors, self.position_m)
-
-    def check_grid(self, grid_hz: float) -> None:
-        """Raise for a grid that would take more memory than there may be.
-
-        Raises
-        ------
-        RadiationError
-        """
-        panels, needed = self._panels(grid_hz), self.needed_bytes(grid_hz)
-        if needed > _MOST_BYTES:
-            raise RadiationError(
-                f"max_frequency_hz: {grid_hz:g} Hz with elements_per_wavelength = {self.elements_per_wavelength:g} "
-                f"take {panels:.0f} panels on this housing and {1e-9 * needed:.0f} GB of memory, more than "
-                f"{1e-9 * _MOST_BYTES:.0f}; what the grid can carry ends at about "
-                f"{grid_hz * (_MOST_BYTES / needed) ** 0.25:.0f} Hz"
-            )
-
-    @property
-    def _mirrors(self) -> tuple[Axis, ...]:
-        return ("x", "y", "z") if self.ground_m is None else ("x", "y")
-
-    def _largest_panel_m(self, grid_hz: float) -> float:
+    def panel_m(self, grid_hz: float) -> float:
+        """Return the size of the panels of the grid that carries frequencies up to one."""
         return min(self.sound_speed_m_s / (self.elements_per_wavelength * grid_hz), min(self.extent_m) / 6.0)
 
-    def _panels(self, grid_hz: float) -> int:
-        largest = self._largest_panel_m(grid_hz)
+    def panels_about(self, grid_hz: float) -> float:
+        """Return about how many panels that grid has."""
+        largest = self.panel_m(grid_hz)
         pairs = itertools.combinations(self.extent_m, 2)
         return sum(2 * math.ceil(one / largest) * math.ceil(other / largest) for one, other in pairs)
 
-    def needed_bytes(self, grid_hz: float) -> float:
-        """Return the memory that the systems of the grid for a frequency take, about."""
-        return 16.0 * float(self._panels(grid_hz)) ** 2 / 2 ** len(self._mirrors)
-
-    @property
-    def clearance_m(self) -> float:
-        """Least distance of sources and receivers from the walls: three quarters of a panel of the coarsest grid."""
-        return max(0.05, 1.1 * self._largest_panel_m(COARSEST_GRID_HZ))
-
-    def check_sphere(self, radius_m: float) -> None:
-        """Raise for a sphere around the drive's centre that does not enclose box and sources with room.
-
-        Raises
-        ------
-        RadiationError
-        """
-        farthest = max((math.dist(source, self.centre_m) for source in self.sources_m), default=0.0)
-        least = max(_NEAR * self.radius_m, 1.05 * farthest)
-        if radius_m < least:
-            raise RadiationError(
-                f"a sphere of {radius_m:g} m does not enclose the housing and the sources with room: it takes "
-                f"{least:.3g} m at least"
-            )
-
-    def waves(self, frequency_hz: float) -> Multipoles:
-        """Return the outgoing waves that carry the box's sound at a frequency."""
-        from tdacoustic.radiation.multipoles import Multipoles, degree_for
-
-        wave = self.wave_number_rad_m(frequency_hz)
-        degree = degree_for(wave, self.radius_m)
-        return Multipoles(wave, self.centre_m, self.radius_m, degree, self.ground_m is not None)
-
-    def direct(self, frequency_hz: float, points_m: ArrayLike) -> Complex:
-        """Return the pressure of the sources without the box, with their images in the ground: (points, sources)."""
-        wave = 1j * self.wave_number_rad_m(frequency_hz)
-        points = np.asarray(points_m, dtype=np.float64).reshape(-1, 1, 3)
-        sources = np.asarray(self.sources_m, dtype=np.float64).reshape(1, -1, 3)
-        found = np.zeros((len(points), sources.shape[1]), dtype=np.complex128)
-        for places in [sources] if self.ground_m is None else [sources, self._mirrored(sources)]:
-            distance = np.linalg.norm(points - places, axis=2)
-            found += np.exp(-wave * distance) / distance
-        return found
-
-    def back_to_sources(self, frequency_hz: float) -> Complex:
-        """Return e^{+jkd} of each source at the distance d from the middle of the box: (sources,).
-
-        What the box scatters, times it, is as smooth over frequency as what the box radiates.
-        """
-        ways = [math.dist(source, self.position_m) for source in self.sources_m]
-        return np.exp(1j * self.wave_number_rad_m(frequency_hz) * np.array(ways))
-
-    def _mirrored(self, places_m: NDArray[np.float64]) -> NDArray[np.float64]:
-        assert self.ground_m is not None
-        return places_m * [1.0, 1.0, -1.0] + [0.0, 0.0, 2.0 * self.ground_m]
+    def grid(self, grid_hz: float) -> Surface:
+        """Return that grid."""
+        return box_surface(self.extent_m, self.panel_m(grid_hz), self.mirrors, self.position_m)

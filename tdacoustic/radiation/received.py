@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tdacoustic.radiation.box_in_air import BoxInAir
+from tdacoustic.radiation.body_in_air import BodyInAir
 from tdacoustic.radiation.interpolation import lagrange, spread_nodes, weighted_sum
 from tdacoustic.radiation.transfer_vectors import NearNodes, TransferNodes
 
@@ -35,7 +35,7 @@ class MeanVectors:
     modal : ndarray of complex64, shape (n, modes, modes)
         Hermitian: the mean is qᴴ P q for modal velocities q.
     sources : ndarray, shape (n, sources)
-        Of sources of 1 Pa at 1 m, the box in their field.
+        Of sources of 1 Pa at 1 m, the body in their field.
     """
 
     radius_m: float
@@ -70,14 +70,14 @@ class MeanVectors:
 
 @dataclass(frozen=True)
 class PointVectors:
-    """Pressures at receivers, of each mode and of what the box scatters of each source.
+    """Pressures at receivers, of each mode and of what the body scatters of each source.
 
     Parameters
     ----------
     points_m : tuple of (float, float, float)
     frequency_hz : ndarray, shape (n,)
     columns : ndarray of complex64, shape (n, points, modes + sources)
-        Times e^{+jkR}, R from the centre of the multipoles, and those of sources times `BoxInAir.back_to_sources`, so
+        Times e^{+jkR}, R from the centre of the multipoles, and those of sources times `BodyInAir.back_to_sources`, so
         that they are smooth over frequency.
     """
 
@@ -92,7 +92,7 @@ class PointVectors:
         columns = self.columns[some] if asked is None else self.columns[some][:, list(asked)]
         return np.asarray(np.abs(weights @ (columns[:, :, : len(held)] @ held)) ** 2)
 
-    def of_source(self, body: BoxInAir, frequency_hz: float, source: int, asked: Sequence[int] | None = None) -> Real:
+    def of_source(self, body: BodyInAir, frequency_hz: float, source: int, asked: Sequence[int] | None = None) -> Real:
         """Return |p|² of a source by its number, direct and scattered, at the points or those asked for, in Pa²."""
         some, weights = lagrange(self.frequency_hz, frequency_hz)
         numbers = list(range(len(self.points_m)) if asked is None else asked)
@@ -108,7 +108,7 @@ class PointVectors:
 class _Field:
     """The computed nodes of all bands as one field over frequency."""
 
-    def __init__(self, body: BoxInAir, parts: Sequence[TransferNodes], near: Sequence[NearNodes] = ()) -> None:
+    def __init__(self, body: BodyInAir, parts: Sequence[TransferNodes], near: Sequence[NearNodes] = ()) -> None:
         self.body = body
         held = sorted(parts, key=lambda part: part.frequency_hz[0])
         self.frequency_hz = np.array([f for part in held for f in part.frequency_hz])
@@ -130,18 +130,18 @@ class _Field:
         return np.asarray(np.tensordot(weights, self.near[some] * turns[:, :, None], axes=1))
 
 
-def _waves_back(body: BoxInAir, frequency_hz: float, points_m: ArrayLike) -> Complex:
+def _waves_back(body: BodyInAir, frequency_hz: float, points_m: ArrayLike) -> Complex:
     """Return e^{+jkR} for points at the distance R from the centre of the multipoles."""
     places = np.asarray(points_m, dtype=np.float64).reshape(-1, 3) - np.asarray(body.centre_m)
     return np.asarray(np.exp(1j * body.wave_number_rad_m(frequency_hz) * np.linalg.norm(places, axis=1)))
 
 
-def mean_vectors(body: BoxInAir, parts: Sequence[TransferNodes], radius_m: float) -> MeanVectors:
+def mean_vectors(body: BodyInAir, parts: Sequence[TransferNodes], radius_m: float) -> MeanVectors:
     """Return the means over the sphere of a radius around the drive's centre (over ground, the point below it).
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     parts : sequence of TransferNodes
     radius_m : float
 
@@ -169,16 +169,16 @@ def mean_vectors(body: BoxInAir, parts: Sequence[TransferNodes], radius_m: float
 
 
 def point_vectors(
-    body: BoxInAir, parts: Sequence[TransferNodes], points_m: tuple[Point, ...], near: Sequence[NearNodes] = ()
+    body: BodyInAir, parts: Sequence[TransferNodes], points_m: tuple[Point, ...], near: Sequence[NearNodes] = ()
 ) -> PointVectors:
     """Return the pressures at points.
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     parts : sequence of TransferNodes
     points_m : tuple of (float, float, float)
-        Points for which `BoxInAir.is_near` holds must be among its `near_m`.
+        Points for which `BodyInAir.is_near` holds must be among its `near_m`.
     near : sequence of NearNodes
         Of these.
     """

@@ -1,7 +1,7 @@
-"""The sound of a box's vibrations and of point sources beside it, kept over frequency for any receiver.
+"""The sound of a body's vibrations and of point sources beside it, kept over frequency for any receiver.
 
 What is computed, node by node over frequency, are the multipoles (`multipoles`) of unit modal velocities and of the
-waves that the rigid box scatters; receivers too close for multipoles get their pressures directly, in a computation of
+waves that the rigid body scatters; receivers too close for multipoles get their pressures directly, in a computation of
 their own. All else (means over spheres, directivities, microphones) follows without boundary elements.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import RadiationError
-from tdacoustic.radiation.box_in_air import COARSEST_GRID_HZ, LEAST_ELEMENTS_PER_WAVELENGTH, BoxInAir
+from tdacoustic.radiation.body_in_air import COARSEST_GRID_HZ, LEAST_ELEMENTS_PER_WAVELENGTH, BodyInAir
 from tdacoustic.radiation.interpolation import frequency_nodes
 from tdacoustic.radiation.surfaces import Surface
 
@@ -34,6 +34,7 @@ __all__ = [
     "grid_hz_for",
     "near_band",
     "outgoing_waves",
+    "rungs_of",
     "transfer_band",
 ]
 
@@ -78,8 +79,8 @@ class TransferBand:
 class TransferNodes:
     """Outgoing waves at some frequencies.
 
-    Columns are unit modal velocities (m √kg / s), then unit sources (1 Pa at 1 m), of these what the box scatters,
-    times `BoxInAir.back_to_sources`.
+    Columns are unit modal velocities (m √kg / s), then unit sources (1 Pa at 1 m), of these what the body scatters,
+    times `BodyInAir.back_to_sources`.
 
     Parameters
     ----------
@@ -110,12 +111,12 @@ class NearNodes:
     pressures: NDArray[np.complex64]
 
 
-def frequencies_of(body: BoxInAir, highest_hz: float) -> Real:
+def frequencies_of(body: BodyInAir, highest_hz: float) -> Real:
     """Return the frequencies at which the field is computed, up to one.
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     highest_hz : float
 
     Raises
@@ -144,12 +145,26 @@ def grid_hz_for(frequency_hz: float, highest_hz: float) -> float:
     return max(GRID_LADDER_HZ[0], min(rung, highest_hz))
 
 
-def bands_of(body: BoxInAir, highest_hz: float) -> tuple[TransferBand, ...]:
+def rungs_of(highest_hz: float) -> tuple[float, ...]:
+    """Return the highest frequencies of all grids that frequencies up to one are computed on.
+
+    Examples
+    --------
+    >>> rungs_of(700.0), rungs_of(1500.0)
+    ((1000.0,), (1000.0, 1300.0, 1500.0))
+    """
+    found = [grid_hz_for(LOWEST_HZ, highest_hz)]
+    while found[-1] < highest_hz * (1.0 - 1e-9):
+        found.append(grid_hz_for(found[-1] * (1.0 + 1e-6), highest_hz))
+    return tuple(found)
+
+
+def bands_of(body: BodyInAir, highest_hz: float) -> tuple[TransferBand, ...]:
     """Return the frequencies by grid, few enough at once that two processes share the work.
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     highest_hz : float
     """
     found = []
@@ -162,12 +177,14 @@ def bands_of(body: BoxInAir, highest_hz: float) -> tuple[TransferBand, ...]:
     return tuple(found)
 
 
-def transfer_band(body: BoxInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent) -> TransferNodes:
+def transfer_band(
+    body: BodyInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent
+) -> TransferNodes:
     """Compute the outgoing waves of one band.
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     band : TransferBand
     velocities_of : callable
         From a grid to the mean outward velocity of its panels, one column each: (panels, n).
@@ -178,14 +195,14 @@ def transfer_band(body: BoxInAir, band: TransferBand, velocities_of: Velocities,
     return TransferNodes(band.frequency_hz, tuple(found), body.surface(band.grid_hz).n_panels)
 
 
-def near_band(body: BoxInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent) -> NearNodes:
+def near_band(body: BodyInAir, band: TransferBand, velocities_of: Velocities, done: Done = _silent) -> NearNodes:
     """Compute the pressures at the near receivers of one band; parameters as of `transfer_band`."""
     return NearNodes(band.frequency_hz, np.stack(_over(_near_pressures, body, band, velocities_of, done)))
 
 
 def _over(
-    solve: Callable[[BoxInAir, Surface, NDArray[Any], float], NDArray[np.complex64]],
-    body: BoxInAir,
+    solve: Callable[[BodyInAir, Surface, NDArray[Any], float], NDArray[np.complex64]],
+    body: BodyInAir,
     band: TransferBand,
     velocities_of: Velocities,
     done: Done,
@@ -201,7 +218,7 @@ def _over(
 
 
 def _near_pressures(
-    body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
+    body: BodyInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
 ) -> NDArray[np.complex64]:
     """Return the pressures of all columns at the near receivers at a frequency: (receivers, columns)."""
     problem = _problem(body, surface, frequency_hz)
@@ -213,13 +230,13 @@ def _near_pressures(
 
 
 def outgoing_waves(
-    body: BoxInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
+    body: BodyInAir, surface: Surface, velocities: NDArray[Any], frequency_hz: float
 ) -> NDArray[np.complex64]:
     """Return the multipoles of all columns at a frequency: (harmonics, columns).
 
     Parameters
     ----------
-    body : BoxInAir
+    body : BodyInAir
     surface : Surface
     velocities : ndarray, shape (panels, n)
     frequency_hz : float
@@ -233,7 +250,7 @@ def outgoing_waves(
     return np.concatenate(found, axis=1).astype(np.complex64)
 
 
-def _problem(body: BoxInAir, surface: Surface, frequency_hz: float) -> ExteriorProblem:
+def _problem(body: BodyInAir, surface: Surface, frequency_hz: float) -> ExteriorProblem:
     from tdacoustic.radiation.boundary_elements import ExteriorProblem
 
     return ExteriorProblem(

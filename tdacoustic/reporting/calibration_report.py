@@ -5,6 +5,7 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Column, Document, Facts, Notice, Section, Table
 from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
+from tdacoustic.reporting.sections.what_if import what_if_section
 from tdacoustic.results import CampaignCalibration
 
 __all__ = ["calibration_report"]
@@ -31,13 +32,14 @@ def calibration_report(result: CampaignCalibration) -> Document:
             Section("versions", "Versions", [Facts(list(result.versions.items()))]),
         ],
     )
+    asked = None if result.what_if is None else what_if_section(result.what_if)
     return Document(
         title=campaign.name,
         subtitle=f"The model of {result.fleet.name}, calibrated to the campaign's levels",
         origin=campaign.origin,
         summary=calibration_answer(result),
         notices=notices,
-        sections=[calibration_section(result), provenance],
+        sections=[calibration_section(result), *(() if asked is None else (asked,)), provenance],
         facts=[("Conditions", ", ".join(campaign.conditions())), ("Fleet", result.fleet.name)],
         footer=[f"Made with tdacoustic {__version__}.", "Levels re 20 µPa."],
     )

@@ -278,8 +278,8 @@ class Bars:
         Height of each bar; NaN leaves it out.
     name : str
         Shown in the legend and under the pointer.
-    errors : array_like, shape (n,), optional
-        Half length of an error bar.
+    errors : array_like, shape (n,) or (2, n), optional
+        Half length of an error bar, or its lengths below and above.
     color : int, optional
         Slot of the palette; default: the next one.
     """
@@ -296,7 +296,11 @@ class Bars:
         shape = (len(categories),)
         object.__setattr__(self, "values", _values(f"values of bars {self.name!r}", self.values, shape))
         if self.errors is not None:
-            object.__setattr__(self, "errors", _values(f"errors of bars {self.name!r}", self.errors, shape))
+            ndim = np.ndim(self.errors)
+            of_sides = (2, *shape) if ndim == 2 else shape
+            object.__setattr__(
+                self, "errors", _values(f"errors of bars {self.name!r}", self.errors, of_sides, max(ndim, 1))
+            )
         _slot(f"bars {self.name!r}", self.color)
 
 
@@ -365,6 +369,8 @@ class Figure:
         In CSS pixels on the screen.
     bar_mode : {"group", "stack"}
         How several `Bars` share a category.
+    equal : bool
+        Whether a unit is as long along x as along y, as on a map; on linear axes.
 
     Raises
     ------
@@ -385,6 +391,7 @@ class Figure:
     elements: Sequence[Element]
     height: int = 420
     bar_mode: Literal["group", "stack"] = "group"
+    equal: bool = False
 
     def __post_init__(self) -> None:
         check_slug(self.name, "name of a figure")
@@ -398,6 +405,8 @@ class Figure:
             raise ReportError(f"height of figure {self.name!r} must be 120 to 1600 pixels, got {self.height}")
         if self.bar_mode not in ("group", "stack"):
             raise ReportError(f"bar_mode of figure {self.name!r} must be 'group' or 'stack', got {self.bar_mode!r}")
+        if self.equal and (self.x_axis.log or self.y_axis.log):
+            raise ReportError(f"figure {self.name!r} has a logarithmic axis, its axes cannot be equal")
         bars = [element for element in elements if isinstance(element, Bars)]
         if len({bar.categories for bar in bars}) > 1:
             raise ReportError(f"the bars of figure {self.name!r} have different categories")

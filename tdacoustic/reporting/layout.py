@@ -63,9 +63,11 @@ def _bar_ends(figure: Figure) -> list[FloatArray]:
     heights = [np.nan_to_num(bar.values) for bar in bars]
     if figure.bar_mode == "stack":
         heights = [np.sum(np.maximum(heights, 0.0), axis=0), np.sum(np.minimum(heights, 0.0), axis=0)]
-    errors = [
-        bar.values + side * np.nan_to_num(bar.errors) for bar in bars if bar.errors is not None for side in (-1, 1)
-    ]
+    errors = []
+    for bar in bars:
+        if bar.errors is not None:
+            below, above = np.broadcast_to(np.nan_to_num(bar.errors), (2, bar.values.size))
+            errors += [bar.values - below, bar.values + above]
     return [*heights, *errors, np.zeros(0 if figure.y_axis.log else 1)]
 
 

@@ -279,6 +279,8 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
     height = figure.height * INCHES_PER_PIXEL * 72
     _set_axis(axes, figure.x_axis, "x", x_range, height)
     _set_axis(axes, figure.y_axis, "y", y_range, height)
+    if figure.equal:
+        axes.set_aspect("equal", adjustable="box")
     heat = any(isinstance(element, Heatmap) for element in figure.elements)
     axes.grid(not heat, axis="y" if figure.categories else "both")
     if figure.categories:

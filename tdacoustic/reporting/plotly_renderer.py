@@ -188,7 +188,17 @@ def _markers(figure: Figure, element: Markers, ink: str) -> dict[str, Any]:
 
 
 def _error_bars(errors: FloatArray, ink: str) -> dict[str, Any]:
-    return {"type": "data", "array": rounded(errors, 4), "color": ink, "thickness": 1.2, "width": 4}
+    look = {"color": ink, "thickness": 1.2, "width": 4}
+    if errors.ndim == 2:
+        below, above = errors
+        return {
+            "type": "data",
+            "symmetric": False,
+            "array": rounded(above, 4),
+            "arrayminus": rounded(below, 4),
+            **look,
+        }
+    return {"type": "data", "array": rounded(errors, 4), **look}
 
 
 def _bars(figure: Figure, element: Bars, ink: str) -> dict[str, Any]:
@@ -360,6 +370,10 @@ def _layout(figure: Figure) -> dict[str, Any]:
     if figure.categories:
         names = [escape_text(name) for name in figure.categories]
         x_axis |= {"tickmode": "array", "tickvals": list(range(len(names))), "ticktext": names, "ticks": ""}
+    y_axis = _axis(figure.y_axis, y_range, figure.height - 70.0, grid=not heat)
+    if figure.equal:  # to the right, beside the scale of a map
+        x_axis |= {"constrain": "domain", "constraintoward": "right"}
+        y_axis |= {"scaleanchor": "x", "scaleratio": 1, "constrain": "domain"}
     traces = [element for element in figure.elements if isinstance(element, Line | Markers | Bars)]
     sizes = [element.values.size if isinstance(element, Bars) else element.x.size for element in traces]
     few = 1 < len(traces) <= 8 and max(sizes) <= 200 and bool(figure.categories)
@@ -371,7 +385,7 @@ def _layout(figure: Figure) -> dict[str, Any]:
         "paper_bgcolor": "paper",
         "plot_bgcolor": "paper",
         "xaxis": x_axis,
-        "yaxis": _axis(figure.y_axis, y_range, figure.height - 70.0, grid=not heat),
+        "yaxis": y_axis,
         "showlegend": _legend_entries(tuple(figure.elements)) > 1,
         "legend": {
             "orientation": "h",

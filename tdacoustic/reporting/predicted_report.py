@@ -5,19 +5,26 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Section
 from tdacoustic.reporting.sections.bearing_loads import bearing_loads
+from tdacoustic.reporting.sections.coupling import coupling_section
+from tdacoustic.reporting.sections.design_sweeps import design_sweeps
 from tdacoustic.reporting.sections.directivity import directivity
 from tdacoustic.reporting.sections.gear_answer import gear_answer
 from tdacoustic.reporting.sections.gear_method import gear_method
 from tdacoustic.reporting.sections.gear_pair import gear_pair
 from tdacoustic.reporting.sections.helix_sweep import helix_sweep
 from tdacoustic.reporting.sections.housing import housing_section
+from tdacoustic.reporting.sections.insertion_loss import insertion_loss_section
 from tdacoustic.reporting.sections.mesh_stiffness import mesh_stiffness
 from tdacoustic.reporting.sections.meshing_noise import meshing_noise
 from tdacoustic.reporting.sections.model_parameters import model_parameters
+from tdacoustic.reporting.sections.near_field import near_field_section
+from tdacoustic.reporting.sections.paper_features import paper_features
 from tdacoustic.reporting.sections.printed import PAPER
+from tdacoustic.reporting.sections.sensitivity import sensitivity
 from tdacoustic.reporting.sections.sound_field import sound_field
 from tdacoustic.reporting.sections.speed_sweep import speed_sweep
 from tdacoustic.reporting.sections.transmission_error import transmission_error
+from tdacoustic.reporting.sections.what_if import what_if_of
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["PREDICTED_FOOTER", "predicted_report", "predicted_sections"]
@@ -67,9 +74,16 @@ def predicted_sections(result: FleetPrediction) -> list[Section]:
         speed_sweep,
         meshing_noise,
         housing_section,
+        coupling_section,
         sound_field,
+        insertion_loss_section,
+        what_if_of,
         directivity,
+        near_field_section,
         helix_sweep,
+        paper_features,
+        design_sweeps,
+        sensitivity,
         model_parameters,
     ]
     return [section for section in (make(result) for make in found) if section is not None]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tdacoustic.campaign import Campaign
+from tdacoustic.drive.what_if import WhatIfAnswer
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.fleet import Fleet
 from tdacoustic.results.analysis import Analysis, LogInput
@@ -49,6 +50,8 @@ class CampaignCalibration:
         Of the campaign's conditions and of those of ``[operation]`` that it does not have, by speed.
     records : tuple of (str, Record)
         Key and record of the steps behind the housing's transfer vectors.
+    what_if : WhatIfAnswer or None
+        What changes of the calibrated drive do to its levels, with intervals; None without any condition.
     """
 
     campaign: Campaign
@@ -58,6 +61,7 @@ class CampaignCalibration:
     inputs: tuple[LogInput, ...]
     over_speed: tuple[SpeedLevel, ...] = ()
     records: tuple[tuple[str, Record], ...] = ()
+    what_if: WhatIfAnswer | None = None
 
     @property
     def versions(self) -> dict[str, str]:

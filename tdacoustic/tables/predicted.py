@@ -10,7 +10,10 @@ import numpy as np
 
 from tdacoustic.drive import Directivity, DriveSound, GearState, HelixCase, Prediction, SpeedSweep
 from tdacoustic.gears import DIRECTIONS, GEARS, Branch, SteadyState
+from tdacoustic.tables.coupling import coupled_condition_rows, coupling_rows
 from tdacoustic.tables.frames import Row, frame_of
+from tdacoustic.tables.insertion_loss import insertion_loss_rows
+from tdacoustic.tables.near_field import near_field_rows
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -24,9 +27,10 @@ HARMONICS_AT_LEAST = 10
 def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.DataFrame]:
     """Return the tables of a prediction as frames, by name.
 
-    ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix`` and
-    ``speed_sweep``; the last is left out where it was not computed. Columns of parts that the model does not have are
-    empty.
+    ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix``, ``speed_sweep``,
+    ``coupling``, ``coupling_conditions``, ``insertion_loss`` and ``near_field``; the last five are left out where they
+    were not computed.
+    Columns of parts that the model does not have are empty.
 
     Parameters
     ----------
@@ -47,6 +51,13 @@ def predicted_tables(prediction: Prediction, highest_hz: float) -> dict[str, pd.
     rows["helix"] = (_helix_row(case, prediction.surface) for case in prediction.helix)
     if prediction.sweep is not None:
         rows["speed_sweep"] = _sweep_rows(prediction.sweep)
+    if prediction.coupling is not None:
+        rows["coupling"] = coupling_rows(prediction.coupling.curves)
+        rows["coupling_conditions"] = coupled_condition_rows(prediction.coupling)
+    if prediction.insertion_loss is not None:
+        rows["insertion_loss"] = insertion_loss_rows(prediction.insertion_loss)
+    if prediction.maps:
+        rows["near_field"] = (row for field in prediction.maps for row in near_field_rows(field))
     return {name: frame_of(name, table) for name, table in rows.items()}
 
 

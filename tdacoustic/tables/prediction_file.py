@@ -11,6 +11,8 @@ import numpy as np
 from tdacoustic.drive import GearState, Prediction
 from tdacoustic.gears import DIRECTIONS, GEARS, sampling_points
 from tdacoustic.tables.hdf5_groups import describe, group_of, put
+from tdacoustic.tables.insertion_loss import write_insertion_loss
+from tdacoustic.tables.near_field import write_near_field
 
 if TYPE_CHECKING:
     import h5py
@@ -44,8 +46,10 @@ def write_prediction_file(path: Path, model: ModelArrays) -> None:
     Layout: ``/model/mesh/`` with ``time_mesh_periods``, ``stiffness``, ``transmission_error``, and for each condition
     ``/model/conditions/<name>/`` with ``displacement`` (mesh periods x samples), ``line_frequency_hz``,
     ``line_harmonic`` (NaN where it is none), ``force_amplitude`` and ``force_phase`` (gear x direction x line),
-    ``mean_force``, and the spectrum at sampling points: ``point_frequency_hz``, ``point_force``. The attributes
-    ``gears`` and ``directions`` name the rows. Names as in `tdacoustic.tables.result_file.write_result_file`.
+    ``mean_force``, and the spectrum at sampling points: ``point_frequency_hz``, ``point_force``; of a mapped condition
+    also ``near_field/`` (`tdacoustic.tables.near_field.write_near_field`). The attributes ``gears`` and ``directions``
+    name the rows. With a housing ``/model/insertion_loss/`` (`tdacoustic.tables.insertion_loss`). Names as in
+    `tdacoustic.tables.result_file.write_result_file`.
 
     Parameters
     ----------
@@ -79,8 +83,14 @@ def write_model(group: h5py.Group, model: ModelArrays) -> None:
     put(mesh, "stiffness", system.mesh_stiffness_n_per_m * system.contact_lines.relative(time), "N/m")
     put(mesh, "transmission_error", system.transmission_error_at(time), "m")
     conditions = group.create_group("conditions")
+    if prediction.insertion_loss is not None:
+        write_insertion_loss(group.create_group("insertion_loss"), prediction.insertion_loss)
+    maps = {field.condition: field for field in prediction.maps}
     for state in prediction.conditions:
-        _write_condition(group_of(conditions, state.condition.name), state, model.highest_hz)
+        held = group_of(conditions, state.condition.name)
+        _write_condition(held, state, model.highest_hz)
+        if state.condition.name in maps:
+            write_near_field(held.create_group("near_field"), maps[state.condition.name])
 
 
 def _write_condition(group: h5py.Group, state: GearState, highest_hz: float) -> None:

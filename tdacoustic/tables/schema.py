@@ -7,6 +7,11 @@ from typing import Final
 
 __all__ = ["COLUMNS", "TEXT_COLUMNS"]
 
+_FINDINGS: Final = (
+    "influence_1 influence_1_change influence_1_per influence_2 influence_2_change influence_2_per influence_3 "
+    "influence_3_change influence_3_per turned_by turned_at turned_amount"
+)
+
 COLUMNS: Final = MappingProxyType(
     {
         "quality": "run channel check verdict detail",
@@ -31,6 +36,28 @@ COLUMNS: Final = MappingProxyType(
         "transverse_contact_ratio overlap_ratio floquet_max method periodic",
         "speed_sweep": "direction train_speed_km_h mesh_frequency_hz torque_n_m dte_pp_um floquet_max contact_part "
         "periodic repeats_after_mesh_periods method",
+        "coupling": "frequency_hz condition harmonic receptance_one_way_m_per_n receptance_two_way_m_per_n "
+        "mesh_force_one_way_n_per_um mesh_force_two_way_n_per_um pinion_x_force_one_way_db pinion_x_force_two_way_db "
+        "pinion_y_force_one_way_db pinion_y_force_two_way_db pinion_z_force_one_way_db pinion_z_force_two_way_db "
+        "wheel_x_force_one_way_db wheel_x_force_two_way_db wheel_y_force_one_way_db wheel_y_force_two_way_db "
+        "wheel_z_force_one_way_db wheel_z_force_two_way_db",
+        "coupling_conditions": "condition mesh_frequency_hz coupling dte_pp_one_way_um dte_pp_two_way_um "
+        "floquet_max_one_way floquet_max_two_way in_contact_one_way in_contact_two_way structure_spl_4m_one_way_db "
+        "structure_spl_4m_two_way_db mesh_spl_4m_one_way_db mesh_spl_4m_two_way_db spl_4m_one_way_db spl_4m_two_way_db",
+        "insertion_loss": "kind frequency_hz insertion_loss_db mass_law_db condition half_air_loss_db "
+        "double_air_loss_db beside_low_db beside_high_db",
+        "near_field": "condition plane x_m y_m z_m place level_db structure_level_db mesh_level_db motor_level_db",
+        "what_if": "condition train_speed_km_h receiver weighting case level_db change_db change_low_db change_high_db "
+        "level_low_db level_high_db fit_change_low_db fit_change_high_db before_db",
+        "patterns": "sweep value mean_12m_db loudest_db loudest_deg quietest_db quietest_deg range_db",
+        "pattern_correlation": "sweep first second correlation difference_db both_shaped",
+        "sensitivity": "parameter origin value condition helix_angle_deg path per change_db not_varied",
+        "references": f"quantity condition helix_angle_deg kind origin reference_value model_value model_condition "
+        f"difference tolerance verdict {_FINDINGS} sentence",
+        "features": f"feature quantity over shape origin tolerance margin verdict {_FINDINGS} sentence",
+        "sweep_points": "sweep point parameter value words reason",
+        "sweeps": "sweep point condition train_speed_km_h parameters structure_spl_4m_db mesh_spl_4m_db "
+        "motor_spl_4m_db spl_4m_db masuda_spl_1m_db dte_pp_um range_12m_db loudest_deg reason",
         "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
         "unassigned_share line_fraction dominant_excitation confidence leading n_runs spread_db",
     }
@@ -43,7 +70,11 @@ TEXT_COLUMNS: Final = frozenset(
         *("check", "verdict", "detail"),
         *("radiator", "excitation", "source", "evidence", "weighting", "dominant", "dominant_excitation"),
         *("order_name", "leading", "speed_source", "causes"),
+        *("parameter", "parameters", "origin", "per", "not_varied", "kind", "model_condition", "sentence", "words"),
+        *("feature", "over", "shape", "reason", "turned_by"),
+        *(f"influence_{number}{of}" for number in "123" for of in ("", "_per")),
         *("mode", "method", "gear", "direction", "receiver", "path", "sweep"),
+        *("coupling", "plane", "place", "case"),
     }
 )
 """Columns that hold words, even where the words are digits."""

@@ -55,12 +55,14 @@ def calibrate(
     from tdacoustic.drive import gear_unit_of
     from tdacoustic.drive.doubts import structure_doubts
     from tdacoustic.fitting.calibration import calibrate_fleet
+    from tdacoustic.fitting.levels import LevelModel
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
     from tdacoustic.workflows.calibration_setup import candidates_of, fit_settings, free_parameters
     from tdacoustic.workflows.housing_sound import checked_free, housing_sound
     from tdacoustic.workflows.joint_levels import joint_levels
     from tdacoustic.workflows.microphones import microphones
+    from tdacoustic.workflows.what_if import calibrated_what_if
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
@@ -80,6 +82,7 @@ def calibrate(
     if progress is not None:
         progress("calibrating", 0, 1)
     with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
+        model = LevelModel(fleet, joint.data, housing)
         found = calibrate_fleet(
             fleet,
             joint.data,
@@ -90,17 +93,21 @@ def calibrate(
             transferred=transferred,
             earlier=earlier,
             housing=housing,
+            model=model,
         )
         over_speed = _over_speed(fleet, found, joint.data, housing)
+    answer, case_records = calibrated_what_if(campaign, analysis, found, model, store, jobs, progress)
+    asked = () if answer is None else answer.doubts
     unit = gear_unit_of(fleet)
     mesh_hz = {datum.condition.name: unit.mesh_hz(datum.condition.motor_hz) for datum in joint.data}
     unheard = structure_doubts(fleet, list(mesh_hz.items()))
-    doubts = (*joint.doubts, *unheard, *_doubts_of_lines(analysis, joint.data), *found.doubts)
+    doubts = (*joint.doubts, *unheard, *_doubts_of_lines(analysis, joint.data), *found.doubts, *asked)
     found = replace(found, doubts=tuple(dict.fromkeys(doubts)))
     own = written_inputs(campaign, with_fleet=True) if analysis is None else analysis.inputs
     prior_fleet = campaign.calibration.prior_fleet
     prior = () if prior_fleet is None else (fleet_input(prior_fleet, "prior fleet"),)
-    return CampaignCalibration(campaign, fleet, analysis, found, (*own, *joint.inputs, *prior), over_speed, records)
+    inputs, steps = (*own, *joint.inputs, *prior), dict((*records, *case_records))
+    return CampaignCalibration(campaign, fleet, analysis, found, inputs, over_speed, tuple(steps.items()), answer)
 
 
 def _doubts_of_lines(analysis: Analysis | None, data: Sequence[MeasuredLevel]) -> list[str]:

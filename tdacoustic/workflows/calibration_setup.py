@@ -10,6 +10,7 @@ from tdacoustic.errors import CampaignError, FittingError, FleetError
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
+    from tdacoustic.campaign.calibration import CalibrationSettings
     from tdacoustic.drive import Receiver
     from tdacoustic.fitting import FreeParameter
     from tdacoustic.fitting.measured_level import MeasuredLevel
@@ -64,7 +65,7 @@ def free_parameters(
     from tdacoustic.fleet.entries import split_entry
     from tdacoustic.fleet.messages import key_problem
 
-    stated = campaign.calibration
+    stated = _with_default(campaign.calibration, fleet)
     free = []
     for name in stated.names:
         held = stated.stated(name)
@@ -102,6 +103,17 @@ def free_parameters(
         bound = OFFSET_BOUNDS * sigma
         free += [FreeParameter(offset_name(name), 0.0, -bound, bound, (0.0, sigma)) for name in campaigns]
     return free, transferred, earlier
+
+
+def _with_default(stated: CalibrationSettings, fleet: Fleet) -> CalibrationSettings:
+    """Settings whose `free`, where the file leaves it out, names the gain of the path that the total adds."""
+    from tdacoustic.drive.levels import paths_of_total
+
+    adds = paths_of_total(fleet)
+    if "free" in stated.model_fields_set or "mesh" in adds or "structure" not in adds:
+        return stated
+    others = [name for name in stated.free if name != "masuda.constant_db"]
+    return stated.model_copy(update={"free": ("model.structure_gain_db", *others)})
 
 
 def _start(name: str, stated: float | None, expression: str | None) -> float | None:

@@ -50,18 +50,20 @@ def housing_sound(
         return None, ()
     from tdacoustic.drive import HousingError, HousingSound
     from tdacoustic.drive.housing_steps import housing_tasks
+    from tdacoustic.drive.insertion_loss import air_tasks
     from tdacoustic.steps import execute, lineage, result_of
 
     tasks = housing_tasks(fleet, receivers)
-    wanted = [tasks.modes, tasks.mean, tasks.points]
+    air = air_tasks(fleet, tasks)
+    wanted = [tasks.modes, tasks.mean, tasks.points, *air]
     outcome = execute(wanted, store, _jobs(tasks, fleet) if jobs is None else jobs, progress)
     for failure in outcome.failed.values():
         if isinstance(failure, RadiationError | HousingError):
             raise FleetError(f"{fleet.path}: [housing]: {failure}") from failure
         raise failure
-    modes, mean, points = (result_of(task, store) for task in wanted)
+    modes, mean, points, *inside = (result_of(task, store) for task in wanted)
     records = dict(pair for task in wanted for pair in lineage(task, store))
-    return HousingSound(tasks.box, tasks.body, modes, mean, points), tuple(records.items())
+    return HousingSound(tasks.box, tasks.body, modes, mean, points, *inside), tuple(records.items())
 
 
 def _jobs(tasks: HousingTasks, fleet: Fleet) -> int:
@@ -86,15 +88,20 @@ def checked_free(fleet: Fleet, names: Sequence[str]) -> None:
     if fleet.radiation.method.value == "point_sources":
         return
     from tdacoustic.drive.housing_steps import housing_tasks
+    from tdacoustic.drive.insertion_loss import air_tasks
     from tdacoustic.errors import FittingError
 
-    before = housing_tasks(fleet)
+    def keys(of: Fleet) -> tuple[str, ...]:
+        tasks = housing_tasks(of)
+        inside = air_tasks(of, tasks)[:1] if of.masuda.placement.value == "inside" else ()
+        return tuple(task.key for task in (tasks.modes, tasks.mean, *inside))
+
+    before = keys(fleet)
     for name in names:
         if "." not in name or "[" in name:
             continue
         value = fleet.value_of(name)
-        after = housing_tasks(fleet.replaced({name: 0.9999 * value if value else 1e-3}))
-        if (after.modes.key, after.mean.key) != (before.modes.key, before.mean.key):
+        if keys(fleet.replaced({name: 0.9999 * value if value else 1e-3})) != before:
             raise FittingError(
                 f"{name} cannot be free with boundary elements: the housing's modes or transfer vectors depend on it, "
                 "and each value of it would take minutes"

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from tdacoustic.results import Analysis
     from tdacoustic.steps import Store
 
-__all__ = ["DATA", "campaign_conditions", "measured_levels"]
+__all__ = ["DATA", "campaign_conditions", "measured_levels", "more_conditions"]
 
 DATA: Final = ("surface", "receivers", "bands", "orders")
 """What a model can be held against."""
@@ -195,6 +195,15 @@ def campaign_conditions(
         torque = statistics.fmean(torques) if torques else torque_at(fleet, speed_km_h)
         found[name] = Condition(name, speed_km_h, motor_hz, torque, fleet.operation.mode.value)
     return found, [*doubts, *_other_modes(campaign, tested, fleet)]
+
+
+def more_conditions(fleet: Fleet, held: Collection[str]) -> dict[str, Condition]:
+    """Return the conditions of the fleet's ``[operation]`` whose names a campaign does not have, by name."""
+    from tdacoustic.drive import conditions_of
+
+    if fleet.operation.train_speed_km_h is None:
+        return {}
+    return {condition.name: condition for condition in conditions_of(fleet) if condition.name not in held}
 
 
 def _run_ups(analysis: Analysis | None) -> set[str]:

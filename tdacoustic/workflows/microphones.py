@@ -10,7 +10,7 @@ from tdacoustic.errors import CampaignError
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign, CampaignChannel
     from tdacoustic.drive import Receiver
-    from tdacoustic.drive.housing_box import BoxInAir
+    from tdacoustic.drive.housing_box import BodyInAir
     from tdacoustic.fleet import Fleet
 
 __all__ = ["microphone_doubts", "microphones"]
@@ -51,17 +51,17 @@ def microphones(campaign: Campaign, fleet: Fleet) -> dict[str, Receiver]:
     return found
 
 
-def _housing_of(fleet: Fleet) -> BoxInAir | None:
+def _housing_of(fleet: Fleet) -> BodyInAir | None:
     """The housing that receivers must keep off; None of point sources."""
     if fleet.radiation.method.value == "point_sources":
         return None
     from tdacoustic.drive import gear_unit_of
-    from tdacoustic.drive.housing_box import body_of, box_of
+    from tdacoustic.drive.housing_box import body_of, housing_of
 
-    return body_of(fleet, box_of(fleet, gear_unit_of(fleet)))
+    return body_of(fleet, housing_of(fleet, gear_unit_of(fleet)))
 
 
-def _too_close(receiver: Receiver, housing: BoxInAir | None) -> bool:
+def _too_close(receiver: Receiver, housing: BodyInAir | None) -> bool:
     """Whether boundary elements take no receiver there."""
     if housing is None or receiver.position_m is None:
         return False

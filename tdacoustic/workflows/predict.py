@@ -57,25 +57,39 @@ def predict(
     from threadpoolctl import threadpool_limits
 
     from tdacoustic.drive import DriveModel, conditions_of
+    from tdacoustic.drive.what_if import check_cases
     from tdacoustic.results import FleetPrediction, LogInput
-    from tdacoustic.tables import predicted_tables
+    from tdacoustic.tables import predicted_tables, what_if_table
+    from tdacoustic.tables.studies import pattern_tables, study_tables
     from tdacoustic.workflows.housing_sound import housing_sound
+    from tdacoustic.workflows.near_field import check_maps, near_fields
+    from tdacoustic.workflows.studies import studies_of
+    from tdacoustic.workflows.what_if import predicted_what_if
 
     fleet = fleet if isinstance(fleet, Fleet) else load_fleet(fleet)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     held = conditions_of(fleet) if conditions is None else tuple(conditions)
     if not held:
         raise FleetError(f"{fleet.path}: there is no condition to compute: no speed is known")
+    check_maps(fleet, held)
+    check_cases(fleet, held)
     housing, transfer_records = housing_sound(fleet, store, jobs, progress, receivers)
     model = DriveModel(fleet, housing=housing)
     with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
-        prediction = model.evaluate(held, receivers)
+        prediction = model.with_insertion_loss(model.with_coupling(model.evaluate(held, receivers)))
     sweep, records, doubts = _sweep(model, max(condition.train_speed_km_h for condition in held), store, progress)
-    prediction = replace(prediction, sweep=sweep, doubts=(*prediction.doubts, *doubts))
+    maps, map_records, unmapped = near_fields(fleet, housing, prediction.sound, store, progress)
+    prediction = replace(prediction, sweep=sweep, maps=maps, doubts=(*prediction.doubts, *doubts, *unmapped))
+    answer, case_records = predicted_what_if(model, held, prediction.sound, receivers, store, housing, jobs, progress)
+    prediction = replace(prediction, doubts=(*prediction.doubts, *answer.doubts))
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)
+    tables["what_if"] = what_if_table(answer)
+    studies, study_records = studies_of(fleet, housing, held, store, progress, jobs)
+    tables |= {**pattern_tables(prediction), **study_tables(studies, fleet)}
     file = log_file(fleet.path)
     inputs = (LogInput(fleet.path.name, file.sha256, file.n_bytes, "TOML"),)
-    return FleetPrediction(fleet, prediction, tables, inputs, (*transfer_records, *records))
+    steps = dict((*transfer_records, *map_records, *records, *case_records, *study_records.items()))
+    return FleetPrediction(fleet, prediction, tables, inputs, tuple(steps.items()), answer, studies)
 
 
 def _sweep(

@@ -20,9 +20,8 @@ from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
-    from tdacoustic.drive import Condition
     from tdacoustic.fleet import Fleet
-    from tdacoustic.results import Analysis, CampaignResult, FleetPrediction
+    from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction
 
 __all__ = ["run"]
 
@@ -79,6 +78,8 @@ def run(
     prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, jobs, progress))
     if prediction is None and lost is not None:
         raise lost
+    if prediction is not None and calibration is not None:
+        prediction = _with_intervals(prediction, calibration)
     not_done = _not_done(campaign, fleet, unfitted, unpredicted)
     return CampaignResult(campaign, analysis, calibration, prediction, not_done)
 
@@ -113,25 +114,26 @@ def _predicted(
     jobs: int | None,
     progress: Progress | None,
 ) -> FleetPrediction:
-    from tdacoustic.workflows.measured_levels import campaign_conditions
+    from tdacoustic.workflows.measured_levels import campaign_conditions, more_conditions
     from tdacoustic.workflows.microphones import microphone_doubts, microphones
     from tdacoustic.workflows.predict import predict
 
     conditions, doubts = campaign_conditions(campaign, analysis, fleet)
-    conditions = {**conditions, **_more_conditions(fleet, conditions)}
+    conditions = {**conditions, **more_conditions(fleet, conditions)}
     receivers = tuple(microphones(campaign, fleet).values())
     found = predict(fleet, store, progress, conditions.values(), receivers, jobs)
     doubts = [*doubts, *microphone_doubts(campaign, fleet), *found.prediction.doubts]
     return replace(found, prediction=replace(found.prediction, doubts=tuple(dict.fromkeys(doubts))))
 
 
-def _more_conditions(fleet: Fleet, held: dict[str, Condition]) -> dict[str, Condition]:
-    """Conditions of the fleet's ``[operation]`` whose names the campaign does not have."""
-    from tdacoustic.drive import conditions_of
+def _with_intervals(prediction: FleetPrediction, calibration: CampaignCalibration) -> FleetPrediction:
+    """The prediction with the calibration's answer to what changes would do: of the same fleet, with intervals."""
+    from tdacoustic.tables import what_if_table
 
-    if fleet.operation.train_speed_km_h is None:
-        return {}
-    return {condition.name: condition for condition in conditions_of(fleet) if condition.name not in held}
+    answer = calibration.what_if
+    if answer is None:
+        return prediction
+    return replace(prediction, what_if=answer, tables={**prediction.tables, "what_if": what_if_table(answer)})
 
 
 def _not_done(

@@ -89,6 +89,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
 
     with folder:
         _write_fit(folder, result)
+        _write_tables(folder, _asked(result))
         _write_arrays(folder, result.campaign, () if result.analysis is None else result.analysis.runs)
         _write_report(folder, calibration_report(result))
         folder.manifest = {
@@ -117,6 +118,7 @@ def write_run(result: CampaignResult, folder: OutputFolder) -> None:
         _write_tables(folder, analysis.tables)
         if result.calibration is not None:
             _write_fit(folder, result.calibration)
+            _write_tables(folder, _asked(result.calibration))
         if prediction is not None:
             _write_tables(folder, prediction.tables)
         _write_arrays(folder, result.campaign, analysis.runs, prediction)
@@ -144,6 +146,13 @@ def _write_fit(folder: OutputFolder, result: CampaignCalibration) -> None:
 
     folder.write_text("calibration.json", calibration_json(result))
     folder.write_text("fleet.calibrated.toml", fleet_toml(result.calibration.fleet))
+
+
+def _asked(result: CampaignCalibration) -> dict[str, pd.DataFrame]:
+    """The table of what changes of the calibrated drive do, where there is one."""
+    from tdacoustic.tables import what_if_table
+
+    return {} if result.what_if is None else {"what_if": what_if_table(result.what_if)}
 
 
 def _write_arrays(

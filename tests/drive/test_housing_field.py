@@ -204,7 +204,7 @@ def test_a_far_receiver_costs_no_boundary_elements(fleet):
         ("= 700", "= 20000", "what the grid can carry ends at about"),
         ("elements_per_wavelength = 7.5", "elements_per_wavelength = 3", "must be at least 5"),
         ("circle_radius_m = { value = 12,", "circle_radius_m = { value = 0.2,", "lies inside the housing"),
-        ("size_m = [0.2", 'step_file = "box.step"\nsize_m = [0.2', "only the parametric box"),
+        ("size_m = [0.2", 'step_file = "box.step"\nsize_m = [0.2', "step_file: there is no file .*box.step"),
         (
             "[radiation]",
             '[radiation]\nspace = "half"',

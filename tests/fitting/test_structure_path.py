@@ -98,3 +98,28 @@ def test_masuda_alone_next_to_structure_is_said_to_count_twice(fleet, housing):
     found = calibrate_fleet(both, data, [FreeParameter(GAIN, 0.0, -30.0, 60.0)], housing=housing)
     assert any("counted twice" in doubt for doubt in found.doubts)
     assert math.isfinite(found.parameters[0].value)
+
+
+def test_a_calibration_has_the_fleets_coupling(fleet, housing):
+    """Two-way: the levels are the drive model's, and the housing's loss factor changes the motion of the gears too."""
+    coupled = fleet.replaced({"model.coupling": "two_way"})
+    for values in ({LOSS: 0.07}, {LOSS: 0.15, "gear_dynamics.mesh_damping_ratio": 0.09}, {GAIN: 4.0}):
+        data = data_of(coupled, housing, values)
+        model = LevelModel(coupled, data, housing)
+        model.levels_db({})  # a motion of another loss factor is known
+        assert model.levels_db(values) == pytest.approx([datum.level_db for datum in data], abs=1e-5)
+    one_way = LevelModel(fleet, data, housing)
+    assert np.abs(model.levels_db({}) - one_way.levels_db({})).max() > 0.5
+    kept, moved = (held._motion(held._fleet({LOSS: 0.2}), {LOSS: 0.2})[1] for held in (one_way, model))
+    assert kept is one_way._motion(one_way.fleet, {})[1]
+    assert moved is not model._motion(model.fleet, {})[1]
+
+
+def test_the_loss_factor_comes_back_through_both_ways(fleet, housing):
+    coupled = fleet.replaced({"model.coupling": "two_way"})
+    data = data_of(coupled, housing, {GAIN: 5.0, LOSS: 0.08})
+    free = [FreeParameter(GAIN, 0.0, -30.0, 30.0), free_parameter(coupled, LOSS)]
+    found = calibrate_fleet(coupled, data, free, FitSettings(model_sigma_db=0.5), housing=housing)
+    values = {parameter.key: parameter.value for parameter in found.parameters}
+    assert values[GAIN] == pytest.approx(5.0, abs=0.05)
+    assert values[LOSS] == pytest.approx(0.08, rel=0.02)

@@ -140,6 +140,9 @@ circle_radius_m = 12
 temperature_degc = -5
 humidity_percent = 40
 air_absorption = true
+map_conditions = ["3", 5]
+map_half_width_m = 1.2
+map_spacing_m = 0.04
 """
 
 
@@ -177,6 +180,7 @@ def test_defaults_are_those_of_the_contract_and_say_so(load):
         "model.gear_path": ("masuda", default),
         "model.structure_gain_db": (0.0, default),
         "model.motor_gain_db": (0.0, default),
+        "model.coupling": ("one_way", default),
         "radiation.method": ("point_sources", default),
         "radiation.space": ("free", default),
         "radiation.max_frequency_hz": (3000.0, default),
@@ -186,6 +190,8 @@ def test_defaults_are_those_of_the_contract_and_say_so(load):
         "radiation.temperature_degc": (20.0, default),
         "radiation.humidity_percent": (50.0, default),
         "radiation.air_absorption": (False, default),
+        "radiation.map_half_width_m": (1.5, default),
+        "radiation.map_spacing_m": (0.05, default),
     }
 
 
@@ -403,6 +409,11 @@ EXCITATION = '[[motor.excitation]]\nname = "e"\n'
         (LEAST + 'name = "2"\n' + PAIR, r"\[\[gear_pair\]\] 2: the name '2' stands twice, also at 1"),
         (LEAST + '[model]\ngear_pair = "slow"\n', r"\[model\]: gear_pair must be one of 1, got 'slow'"),
         (LEAST + '[model]\ngear_path = "both"\n', "gear_path must be one of masuda, structure, sum, got 'both'"),
+        (LEAST + '[model]\ncoupling = "both"\n', "coupling must be one of one_way, two_way, got 'both'"),
+        (
+            LEAST + '[model]\ncoupling = "two_way"\n',
+            r'\[model\]: coupling = "two_way" needs \[radiation\] method = "boundary_elements", got "point_sources"',
+        ),
         (LEAST + "[operation]\ntrain_speed_km_h = [20, -1]\n", "train_speed_km_h, entry 2, must be > 0, got -1"),
         (
             LEAST + '[operation]\ntrain_speed_km_h = [20]\ncondition_names = ["a", "b"]\n',
@@ -525,13 +536,14 @@ def test_the_committed_fleets_have_the_papers_geometry_with_its_origin(name):
     assert fleet.number("operation.torque_n_m") * 2 * math.pi * 1938 / 60 == pytest.approx(1.2e6, rel=1e-4)
 
 
-def test_the_demonstration_differs_from_the_reference_drive_in_motor_places_and_range_alone():
+def test_the_demonstration_differs_from_the_reference_drive_in_motor_places_range_and_gear_path_alone():
     reference, demonstration = (
         {stated.key: stated for stated in load_fleet(ROOT / "calibration" / name).parameters()}
         for name in ("reference-drive", "crrc-freight")
     )
     differing = {key for key in reference | demonstration if reference.get(key) != demonstration.get(key)}
     own = {"motor.carrier_hz", "motor.position_m", "housing.position_m", "radiation.max_frequency_hz"}
+    own |= {"model.gear_path", "model.structure_gain_db", "masuda.displacement"}
     assert {key for key in differing if not key.startswith("motor.excitation.")} == own
     assert all(demonstration[key].origin == "assumed" for key in own)
 

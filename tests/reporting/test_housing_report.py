@@ -157,9 +157,10 @@ def test_the_level_names_what_the_total_adds_and_what_stands_beside_it(result, d
         (
             "sum",
             "inside",
-            ("motor", "structure"),
-            'the meshing noise is shown but not added ([masuda] placement = "inside").',
-            "structure 70.0 dB; not added: mesh ",
+            ("motor", "mesh", "structure"),
+            "The total adds the energies of the motor's tones, the meshing noise and the structure (bearing forces "
+            "through the housing).",
+            "structure 70.0 dB)",
         ),
     ],
 )
@@ -325,7 +326,8 @@ def test_shapes_are_compared_by_their_correlation(document):
 
 def test_helix_angles_have_their_directions_folded(result, document):
     (section,) = [section for section in document.sections if section.id == "directivity"]
-    (folded,) = [block for block in section.blocks if isinstance(block, Details)]
+    pairs, folded = [block for block in section.blocks if isinstance(block, Details)]
+    assert pairs.summary == "Shapes in pairs"
     names = [block.figure.name for block in folded.blocks if isinstance(block, FigureBlock)]
     assert names == ["directivity-helix", "directivity-helix-shape"]
     assert len(table(document, "directivity-helix-angles")) == len(result.prediction.helix)

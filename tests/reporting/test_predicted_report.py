@@ -142,7 +142,7 @@ def test_every_doubt_of_the_prediction_is_a_warning_of_the_summary(reference, ra
 def test_the_sections_stand_in_the_order_of_the_model(reference):
     assert [section.id for section in predicted_report(reference).sections] == [
         "gear-pair", "mesh-stiffness", "transmission-error", "bearing-forces", "speed-sweep", "meshing-noise",
-        "sound-field", "helix-sweep", "model-parameters", "provenance",
+        "sound-field", "what-if", "helix-sweep", "sensitivity", "model-parameters", "provenance",
     ]  # fmt: skip
 
 
@@ -315,7 +315,7 @@ def test_where_the_numbers_come_from_is_said(reference):
     document = predicted_report(reference)
     (row,) = table(document, "inputs")
     assert row["sha256"] == reference.inputs[0].sha256
-    assert {row["label"] for row in table(document, "steps")} == {"up", "down"}
+    assert {row["label"] for row in table(document, "steps")} == {"up", "down", "6 conditions"}
     assert "harmonics" in words(document) and "The backlash is 200 µm" in words(document)
 
 

@@ -58,6 +58,9 @@ def test_every_column_is_filled(found):
     assert len(around) == 7 * 72
     assert np.isfinite(around["spl_12m_db"].to_numpy(dtype=float)).all()
     assert tables["helix"]["spl_4m_db"].notna().all()
+    through = tables["insertion_loss"]
+    assert set(through["kind"]) == {"line", "third_octave", "mesh"}
+    assert through["insertion_loss_db"].notna().all()
 
 
 def test_progress_names_the_steps_and_their_parts(found):
@@ -71,6 +74,7 @@ def test_progress_names_the_steps_and_their_parts(found):
 def test_the_steps_are_recorded(found):
     steps = {record.step for _, record in found[0].records}
     assert {"housing-modes", "transfer-vectors", "mean-vectors", "point-vectors"} <= steps
+    assert {"cavity-modes", "insertion-loss"} <= steps
 
 
 def test_a_later_prediction_computes_nothing(found, store):
@@ -85,7 +89,7 @@ def test_another_torque_or_loss_factor_computes_no_vectors(found, store, tmp_pat
     changed = small_fleet(tmp_path / "other", **{"loss_factor = 0.03": "loss_factor = 0.1", "= 5913": "= 3000"})
     other = td.predict(changed, store, jobs=1)
     new = {record.step for key, record in other.records if f"{key}.npz" not in kept}
-    assert new <= {"gear-sweep"}
+    assert new <= {"gear-sweep", "insertion-loss", "responses"}
     level = "structure_spl_4m_db"
     assert not np.allclose(other.tables["conditions"][level], found[0].tables["conditions"][level], atol=0.1)
 
@@ -195,3 +199,19 @@ def test_a_sphere_too_small_is_refused_before_anything_is_computed(call_program,
     assert code == 1
     assert "a sphere of 0.4 m does not enclose the housing and the sources with room" in err
     assert str(fleet) in err
+
+
+def test_the_source_inside_through_the_command(found, store, tmp_path):
+    """The mesh is lower by the insertion loss at its frequency; where the source stands cannot be free."""
+    changed = small_fleet(tmp_path / "inside", **{'placement = "free"': 'placement = "inside"'})
+    other = td.predict(changed, store, jobs=1)
+    loss = other.tables["insertion_loss"]
+    loss = loss[loss["kind"] == "mesh"].set_index("condition")["insertion_loss_db"]
+    apart = found[0].tables["conditions"]["mesh_spl_4m_db"] - other.tables["conditions"]["mesh_spl_4m_db"]
+    assert apart.to_numpy() == pytest.approx(loss.to_numpy(), abs=0.1)
+    assert loss.min() > 5.0
+    fleet = load_fleet(small_fleet(tmp_path / "told", **{'placement = "free"': 'placement = "inside"'}))
+    told = fleet.replaced({"masuda.position_m": (0.05, 0.0, 0.1)})
+    with pytest.raises(FittingError, match=r"masuda\.position_m\.3 cannot be free"):
+        checked_free(told, ["masuda.position_m.3"])
+    checked_free(told, ["housing.cavity_loss_factor"])

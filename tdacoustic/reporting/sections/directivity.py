@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.drive import Directivity
 from tdacoustic.drive.levels import paths_of_total
+from tdacoustic.drive.patterns import FLAT_DB, SHAPED_DB, Pattern
 from tdacoustic.reporting.document import (
     Block,
     Cell,
@@ -30,10 +32,6 @@ from tdacoustic.results import FleetPrediction
 
 __all__ = ["directivity"]
 
-FLAT_DB: Final = 0.05
-"""Between the loudest and the quietest direction, below which a level is the same all around as it is printed."""
-SHAPED_DB: Final = 1.0
-"""From which a shape is drawn and compared with that of other conditions."""
 MOST_LINES: Final = 8
 
 _SIDES: Final = ((0.0, "travel"), (90.0, "left"), (180.0, "back"), (270.0, "right"))
@@ -44,11 +42,12 @@ class Around(NamedTuple):
 
     name: str
     circle: Directivity
+    pattern: Pattern
 
     @property
     def range_db(self) -> float:
         """From the quietest to the loudest direction."""
-        return float(np.ptp(self.circle.level_db))
+        return self.pattern.range_db
 
 
 def directivity(result: FleetPrediction) -> Section | None:
@@ -62,12 +61,14 @@ def directivity(result: FleetPrediction) -> Section | None:
         blocks += [Sentences(said)] if said else []
         blocks += _figures("directivity", "the conditions", speeds)
         blocks.append(_table("directivity-conditions", "The level around the drive, by condition", "Condition", speeds))
+        blocks += _alike(result, "directivity-alike-conditions", "Condition", "speed", speeds)
     if angles:
         caption = "The level around the drive, by helix angle"
         table = _table("directivity-helix-angles", caption, "Helix angle", angles)
         folded: list[Block] = [
             *_figures("directivity-helix", "the helix angles, at the fastest condition", angles),
             table,
+            *_alike(result, "directivity-alike-helix", "Helix angle", "helix", angles),
         ]
         blocks.append(Details("Directions over the helix angles", folded))
     return Section("directivity", "Directions", blocks)
@@ -75,10 +76,9 @@ def directivity(result: FleetPrediction) -> Section | None:
 
 def _over_speed(result: FleetPrediction) -> list[Around]:
     """Circles of the conditions that make a sound, by speed."""
-    circles = [circle for circle in result.prediction.directivity if circle.sweep == "speed"]
     named = [
-        Around(f"{sound.condition} ({circle.value:.4g} km/h)", circle)
-        for sound, circle in zip(result.prediction.sound, circles, strict=False)
+        Around(f"{sound.condition} ({circle.value:.4g} km/h)", circle, pattern)
+        for sound, (circle, pattern) in zip(result.prediction.sound, _heard(result, "speed"), strict=False)
         if np.isfinite(circle.level_db).all()
     ]
     return sorted(named, key=lambda around: around.circle.value)
@@ -88,9 +88,18 @@ def _over_helix(result: FleetPrediction) -> list[Around]:
     """Circles of the helix sweep by angle; none where the fleet names no angles."""
     if result.fleet.operation.helix_angle_deg is None:
         return []
-    held = [circle for circle in result.prediction.directivity if circle.sweep == "helix"]
-    named = [Around(f"{circle.value:g}°", circle) for circle in held if np.isfinite(circle.level_db).all()]
+    named = [
+        Around(f"{circle.value:g}°", circle, pattern)
+        for circle, pattern in _heard(result, "helix")
+        if np.isfinite(circle.level_db).all()
+    ]
     return sorted(named, key=lambda around: around.circle.value)
+
+
+def _heard(result: FleetPrediction, sweep: str) -> list[tuple[Directivity, Pattern]]:
+    """Circles of a sweep with their numbers."""
+    both = zip(result.prediction.directivity, result.patterns, strict=True)
+    return [pair for pair in both if pair[0].sweep == sweep]
 
 
 def _method(result: FleetPrediction) -> str:
@@ -132,10 +141,10 @@ def _beyond_words(result: FleetPrediction) -> str:
 def _shape_words(result: FleetPrediction, speeds: list[Around]) -> str:
     """How alike the shapes are; empty of fewer than two that are no circles."""
     shaped = [around for around in speeds if around.range_db >= SHAPED_DB]
-    if len(shaped) < 2:
+    alike = [pair.correlation for pair in result.pattern_pairs if pair.sweep == "speed" and pair.both_shaped]
+    if not alike:
         return ""
-    alike = np.corrcoef([around.circle.level_db for around in shaped])[np.triu_indices(len(shaped), 1)]
-    ends = list(dict.fromkeys(f"{value:.2f}" for value in (float(alike.min()), float(alike.max()))))
+    ends = list(dict.fromkeys(f"{value:.2f}" for value in (min(alike), max(alike))))
     text = (
         f"the shapes of the {len(shaped)} conditions with {SHAPED_DB:g} dB or more between directions correlate in "
         f"pairs with {' to '.join(ends)} (1 is the same shape)"
@@ -195,9 +204,32 @@ def _table(name: str, caption: str, of: str, held: Sequence[Around]) -> Table:
     )
     rows: list[list[Cell]] = []
     for around in held:
-        circle, row = around.circle, list[Cell]([around.name])
-        for place in (int(circle.level_db.argmax()), int(circle.level_db.argmin())):
-            at = None if around.range_db < FLAT_DB else float(circle.angle_deg[place])
-            row += [float(circle.level_db[place]), at]
-        rows.append([*row, around.range_db])
+        found = around.pattern
+        at = [None if math.isnan(angle) else angle for angle in (found.loudest_deg, found.quietest_deg)]
+        rows.append([around.name, found.loudest_db, at[0], found.quietest_db, at[1], found.range_db])
     return Table(name, caption, columns, rows, origin="calculated")
+
+
+def _alike(result: FleetPrediction, name: str, of: str, sweep: str, held: Sequence[Around]) -> list[Block]:
+    """How alike each two shapes are, as a table; nothing of fewer than two."""
+    pairs = {(pair.first, pair.second): pair for pair in result.pattern_pairs if pair.sweep == sweep}
+    if len(held) < 2 or not pairs:
+        return []
+    columns = [Column("of", of)]
+    unit = "km/h" if sweep == "speed" else "°"
+    columns += [
+        Column(f"with_{number}", f"{around.pattern.value:.4g}", unit, 2, "number") for number, around in enumerate(held)
+    ]
+    rows: list[list[Cell]] = []
+    for around in held:
+        row: list[Cell] = [around.name]
+        for other in held:
+            low, high = sorted((around.pattern.value, other.pattern.value))
+            pair = pairs.get((low, high))
+            row.append(None if pair is None or math.isnan(pair.correlation) else pair.correlation)
+        rows.append(row)
+    caption = (
+        "How alike the shapes are: correlation of each two over the directions, of levels in dB less their mean; "
+        f"shapes of less than {SHAPED_DB:g} dB say little"
+    )
+    return [Details("Shapes in pairs", [Table(name, caption, columns, rows, origin="calculated")])]

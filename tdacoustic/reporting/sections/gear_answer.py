@@ -42,7 +42,7 @@ SCOPE = (
 SCOPE_WITH_HOUSING = (
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
     "them, and the housing: what the bearing forces make it radiate, and how it scatters the sources beside it. The "
-    "bearing forces are those of bearings in a housing that does not move."
+    "bearing forces are those of bearings in a housing that {moves}."
 )
 
 TERMS = (
@@ -64,8 +64,10 @@ def gear_overview(result: FleetPrediction) -> Section:
 
 def _said(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
+    moves = "gives way under them" if result.fleet.model.coupling.value == "two_way" else "does not move"
+    scope = SCOPE if result.prediction.housing is None else SCOPE_WITH_HOUSING.format(moves=moves)
     blocks: list[Block] = [
-        Paragraph(f"{regime_words(result)} {SCOPE if result.prediction.housing is None else SCOPE_WITH_HOUSING}"),
+        Paragraph(f"{regime_words(result)} {scope}"),
         Sentences([_of_condition(result.fleet, state, sound_words(result, state)) for state in states]),
     ]
     if any(state.masuda_db is not None for state in states):

@@ -132,7 +132,8 @@ def _modes(result: FleetPrediction) -> Table:
         *(Column(f"mesh_{n}_km_h", f"Mesh x{n}", "meets it at km/h", 1, "number") for n in HARMONICS),
         Column("conditions", f"Conditions within {100 * NEAR:.0f} %"),
     )
-    return Table("modes", "Natural frequencies, teeth in contact", columns, rows, origin="calculated")
+    caption = "Natural frequencies, teeth in contact, bearing seats that do not move"
+    return Table("modes", caption, columns, rows, origin="calculated")
 
 
 def _near(states: list[GearState], frequency: float) -> str:

@@ -30,10 +30,24 @@ FRAMES = (
     "torque is traction forward. In the drive's frame x is the direction of travel, y is to the left, z is up; 0, 0, 0 "
     "is the drive's centre."
 )
+TWO_WAY = (
+    "The coupling is two-way: the bearing seats give way under the gears, and the bearing forces are those on a "
+    "housing that moves."
+)
 ONE_WAY = (
     "The coupling is one-way: the bearing forces are those on a foundation that does not move, and the housing does "
     "not act back on the gears. Around 500 Hz panel, seat and bearing have impedances of one size, so a single "
     "direction of force, the axial one above all, may be off by several dB."
+)
+METHOD_STEP = (
+    "The gears stand in the housing of a STEP file: one closed hollow solid of one material, on soft springs at its "
+    "bearing seats and at a hanger. Its modes come from finite elements (curved tetrahedra of order 4); the sound of "
+    "each mode, and of point sources beside the rigid housing, comes from boundary elements on flat panels over its "
+    "outside, once for all conditions, helix angles and loss factors."
+)
+LEFT_OUT_STEP = (
+    "Joints and screws of the housing are left out, and so are oil and gears in it and the air inside. The motor's "
+    "body, wheels, bogie and car body neither radiate nor scatter."
 )
 LEFT_OUT = (
     "Ribs, flanges, bores and joints of the housing are left out, and so are oil and gears in it and the air inside. "
@@ -46,10 +60,12 @@ def housing_section(result: FleetPrediction) -> Section | None:
     housing = result.prediction.housing
     if housing is None:
         return None
-    blocks: list[Block] = [Paragraph(METHOD), Facts(_facts(housing))]
+    is_box = housing.step_file is None
+    blocks: list[Block] = [Paragraph(METHOD if is_box else METHOD_STEP), Facts(_facts(housing))]
     if len(housing.mode_hz):
         blocks.append(FigureBlock(_figure(result, housing), "calculated"))
-    blocks.append(Sentences([FRAMES, _split_words(housing), ONE_WAY, LEFT_OUT]))
+    words = [FRAMES, _split_words(housing), _coupling_words(result), LEFT_OUT if is_box else LEFT_OUT_STEP]
+    blocks.append(Sentences([*housing.notes, *words]))
     blocks.append(_parameters(result))
     return Section("housing", "The housing", blocks)
 
@@ -59,7 +75,8 @@ def _facts(housing: HousingFacts) -> list[Fact]:
     modes = housing.mode_hz
     below = int(np.count_nonzero(modes <= high))
     first = [f"{value:.1f}" for value in modes[:FIRST_MODES]]
-    facts = [
+    facts = [] if housing.step_file is None else [Fact("From the STEP file", housing.step_file)]
+    facts += [
         Fact("Mass", f"{housing.mass_kg:.0f} kg, of the finite elements"),
         Fact("Frequency range", f"{low:.0f} to {high:.0f} Hz"),
         Fact(
@@ -92,6 +109,10 @@ def _split_words(housing: HousingFacts) -> str:
         f"rule for where the gear stands on its shaft: the left bearing takes {of_left}, the right one the rest. So is "
         "the axial force, which in truth one bearing may hold alone and which tilts it."
     )
+
+
+def _coupling_words(result: FleetPrediction) -> str:
+    return TWO_WAY if result.fleet.model.coupling.value == "two_way" else ONE_WAY
 
 
 def _figure(result: FleetPrediction, housing: HousingFacts) -> Figure:

@@ -24,10 +24,14 @@ _FIELD: Final = {
 _WITH_HOUSING: Final = {
     "radiation.max_frequency_hz": ("Highest frequency of the housing and of listed forces", "Hz"),
     "radiation.elements_per_wavelength": ("Boundary elements a wavelength", ""),
+    "radiation.map_half_width_m": ("Maps close to the housing: from the drive's centre to their edges", "m"),
+    "radiation.map_spacing_m": ("Maps close to the housing: between their points", "m"),
+    "model.coupling": ("Coupling of gears and housing", ""),
     "model.structure_gain_db": ("Added to the structure's levels", "dB"),
     "motor.position_m": ("Position of the motor's sources, x, y, z", "m"),
     "masuda.position_m": ("Position of the mesh's source, x, y, z", "m"),
     "housing.size_m": ("Housing: size along the shafts, along travel, up", "m"),
+    "housing.step_file": ("Housing: STEP file", ""),
     "housing.position_m": ("Housing: its middle in the drive's frame, x, y, z", "m"),
     "housing.wall_mm": ("Housing: thickness of the end walls", "mm"),
     "housing.bearing_panel_mm": ("Housing: thickness of the bearing panels", "mm"),
@@ -36,6 +40,7 @@ _WITH_HOUSING: Final = {
     "housing.material.density_kg_m3": ("Housing: density", "kg/m³"),
     "housing.material.poisson": ("Housing: Poisson's ratio", ""),
     "housing.loss_factor": ("Housing: loss factor", ""),
+    "housing.cavity_loss_factor": ("Housing: loss factor of the air inside", ""),
     "housing.hanger_stiffness_n_per_m": ("Housing: stiffness of the hanger, x, y, z", "N/m"),
 }
 _SEAT: Final = {
@@ -49,6 +54,8 @@ _SEAT: Final = {
 def housing_named(fleet: Fleet, key: str) -> tuple[str, str] | None:
     """Return words and unit of a parameter of housing or sound field that the model uses, None of another."""
     with_housing = fleet.radiation.method.value == "boundary_elements"
+    if with_housing and key == "housing.position_m" and fleet.step_path is not None:
+        return "Housing: origin of its STEP file in the drive's frame, x, y, z", "m"
     if with_housing and key in _WITH_HOUSING:
         return _WITH_HOUSING[key]
     if with_housing and key.startswith("housing.seat.") and fleet.housing is not None:

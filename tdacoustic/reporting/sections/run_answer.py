@@ -18,6 +18,7 @@ from tdacoustic.reporting.sections.gear_words import (
     state_words,
 )
 from tdacoustic.reporting.sections.sound_paths import SoundPath, heard_paths, is_added
+from tdacoustic.reporting.sections.what_if import what_if_line
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import CampaignResult, FleetPrediction
 
@@ -29,7 +30,9 @@ MOST_LEVELS = 8
 
 def run_answer(result: CampaignResult) -> list[Block]:
     """Return the summary: all in a few lines, then sources, fit and prediction with what speaks against them."""
-    short = [line for line in (_dominance_line(result), calibration_line(result), prediction_line(result)) if line]
+    asked = "" if result.prediction is None else what_if_line(result.prediction.what_if)
+    lines = _dominance_line(result), calibration_line(result), prediction_line(result), asked
+    short = [line for line in lines if line]
     blocks: list[Block] = [Sentences(short)] if short else []
     blocks.append(Section("answer-sources", "Which source dominates", conditions_answer(result.analysis)))
     if result.calibration is not None:

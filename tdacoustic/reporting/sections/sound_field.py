@@ -121,6 +121,12 @@ def _path_words(fleet: Fleet, housing: HousingFacts) -> list[str]:
         f"Mesh: {OF_MESH[:1].lower()}{OF_MESH[1:]}, outside of the housing. That level is of a gear unit with its "
         "housing, so the power of the source is held: the rigid housing gives it a direction and nothing else."
     )
+    if housing.inside_m is not None:
+        mesh = (
+            f"Mesh: {OF_MESH[:1].lower()}{OF_MESH[1:]}, inside of the housing. Its volume flow is held; the air inside "
+            "shakes the walls, and what they radiate is the level of the mesh (section Insertion loss of the housing). "
+            "Its sound power level is that of a point source with the same mean level outside."
+        )
     return [structure, *([] if housing.motor_m is None else [motor]), mesh]
 
 

@@ -162,8 +162,8 @@ def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
         "sweep-dte",
         "Dynamic transmission error over the speed sweep",
         "Peak to peak, of a motion that does not repeat that of its record. Broken vertical lines are natural "
-        "frequencies of the linear system; the nth harmonic of the mesh meets one already at an nth of it. Diamonds "
-        "are the conditions, each computed by itself from teeth in contact.",
+        "frequencies of the linear system on seats that do not move; the nth harmonic of the mesh meets one already "
+        "at an nth of it. Diamonds are the conditions, each computed by itself from teeth in contact.",
         Axis("Mesh frequency", "Hz", limits=(low, high)),
         Axis("DTE", "µm", note="peak to peak"),
         elements,

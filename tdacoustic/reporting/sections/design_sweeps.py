@@ -1,0 +1,135 @@
+"""Design sweeps: levels over one parameter as lines, over two as maps, over more as a table."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Section,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Figure, Heatmap, Line
+from tdacoustic.reporting.sections.parameters import value_words
+from tdacoustic.reporting.sections.words import joined, slug
+from tdacoustic.results import FleetPrediction
+from tdacoustic.studies import SweepResult
+from tdacoustic.studies.words import number_words, unit_of
+
+__all__ = ["design_sweeps"]
+
+MOST_LINES: Final = 8
+_WIDE: Final = 20.0
+"""Largest over smallest value from which an axis is logarithmic."""
+MOST_ROWS: Final = 300
+"""Rows of a table in the page; the whole is in sweeps.csv."""
+
+
+def design_sweeps(result: FleetPrediction) -> Section | None:
+    """Return the section on design sweeps; None where the fleet asks for none."""
+    sweeps = result.studies.sweeps
+    if not sweeps:
+        return None
+    text = (
+        f"Each point is a prediction of its own with other values of the fleet's parameters; the level is the total at "
+        f"{result.prediction.surface}. A helix angle of the modelled pair changes the gears alone, as in the helix "
+        "sweep; a point whose housing differs has modes and transfer vectors of its own."
+    )
+    blocks: list[Block] = [Paragraph(text)]
+    return Section("design-sweeps", "Design sweeps", [*blocks, *(_of(result, sweep) for sweep in sweeps)])
+
+
+def _of(result: FleetPrediction, found: SweepResult) -> Section:
+    name = slug("sweep", found.sweep.name)
+    axes = found.sweep.parameters
+    numeric = all(isinstance(value, float | int) and not isinstance(value, bool) for _, held in axes for value in held)
+    refused = [reason for reason in found.reasons if reason]
+    blocks: list[Block] = []
+    if refused:
+        told = joined(list(dict.fromkeys(refused))[:3])
+        blocks.append(Notice("warning", f"{len(refused)} of {len(found.points)} points cannot be: {told}."))
+    if np.isfinite(found.of("spl_4m_db")).any():
+        if len(axes) == 1 and numeric and len(found.points) > 1:
+            blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
+        elif len(axes) == 2 and numeric and all(len(values) > 1 for _, values in axes):
+            blocks += _maps(result, found, name)
+    table = _table(result, found, name)
+    blocks.append(table if len(table.rows) <= 12 else Details("Levels at each point", [table]))
+    return Section(name, found.sweep.name, blocks)
+
+
+def _label(result: FleetPrediction, key: str) -> str:
+    words = number_words(key, result.fleet) if _is_known(result, key) else key
+    return f"{words[:1].upper()}{words[1:]}"
+
+
+def _is_known(result: FleetPrediction, key: str) -> bool:
+    return not key.rpartition(".")[2].isdecimal() or key.split(".")[0] in ("gear_pair", "gear_dynamics", "housing")
+
+
+def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
+    key, values = found.sweep.parameters[0]
+    there = [place for place in np.argsort(values).tolist() if not found.reasons[place]]
+    x = np.array(values, dtype=float)[there]
+    levels = found.of("spl_4m_db")[there]
+    wide = x.min() > 0.0 and x.max() >= _WIDE * x.min()
+    lines = [
+        Line(x, levels[:, place], f"condition {condition}", points=True)
+        for place, condition in enumerate(found.conditions)
+        if np.isfinite(levels[:, place]).any()
+    ]
+    some = "" if len(lines) <= MOST_LINES else f"{MOST_LINES} of {len(lines)} conditions are drawn."
+    label = _label(result, key)
+    return Figure(
+        name,
+        f"Total over {label[:1].lower()}{label[1:]}",
+        some,
+        Axis(label, unit_of(key), "log" if wide else "linear"),
+        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        lines[:MOST_LINES],
+    )
+
+
+def _maps(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]:
+    """One map a condition, the first in sight."""
+    (key_y, values_y), (key_x, values_x) = found.sweep.parameters
+    order_y, order_x = np.argsort(values_y), np.argsort(values_x)
+    levels = found.of("spl_4m_db").reshape(len(values_y), len(values_x), len(found.conditions))
+    axes = [Axis(_label(result, key), unit_of(key)) for key in (key_x, key_y)]
+    figures = []
+    for place, condition in enumerate(found.conditions):
+        z = levels[:, :, place][order_y][:, order_x]
+        if not np.isfinite(z).any():
+            continue
+        scale = Axis("Level", "dB", reference="20 µPa")
+        x, y = (np.array(held, dtype=float)[of] for held, of in ((values_x, order_x), (values_y, order_y)))
+        heat = Heatmap(x, y, z, f"condition {condition}", scale)
+        title = f"Total in condition {condition} over both parameters"
+        figures.append(FigureBlock(Figure(slug(name, condition), title, "", axes[0], axes[1], [heat]), "calculated"))
+    return [*figures[:1], *([Details("The other conditions", figures[1:])] if figures[1:] else [])]
+
+
+def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
+    keys = [key for key, _ in found.sweep.parameters]
+    columns = [Column("point", "Point", "", 0, "number")]
+    columns += [Column(key.replace(".", "_"), _label(result, key), unit_of(key)) for key in keys]
+    columns += [Column(f"condition_{one}", one, "dB", 1, "number") for one in found.conditions]
+    columns += [Column("reason", "Why not")] if any(found.reasons) else []
+    levels = found.of("spl_4m_db")
+    rows: list[list[Cell]] = []
+    for number, (point, reason) in enumerate(zip(found.points, found.reasons, strict=True)):
+        values = [value_words(key, value) for key, value in point]
+        shown = [None if math.isnan(level) else level for level in levels[number].tolist()]
+        rows.append([number + 1, *values, *shown, *([reason] if any(found.reasons) else [])])
+    some = "" if len(rows) <= MOST_ROWS else f"; the first {MOST_ROWS} of {len(rows)} points, all are in sweeps.csv"
+    caption = f"Total at {result.prediction.surface} by point and condition{some}"
+    return Table(f"{name}-points", caption, columns, rows[:MOST_ROWS], origin="calculated")

@@ -1,0 +1,266 @@
+"""What the housing takes from a source inside it, over frequency and at the conditions' mesh frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.drive.insertion_loss import ASIDE_M, InsertionLoss, MeshLoss
+from tdacoustic.fleet import Fleet
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.sections.gear_words import hertz
+from tdacoustic.reporting.sections.printed import is_of_the_paper
+from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["insertion_loss_section"]
+
+METHOD: Final = (
+    "The insertion loss is the sound power level of a source in free field less the one that the housing radiates with "
+    "the source inside; the latter from the mean over the surface at {surface}. The source is a point whose volume "
+    "flow is held. It stands {place}. The air inside and the walls act on each other: modes of the air between rigid "
+    "walls and the housing's modes (finite elements); boundary elements give the sound outside."
+)
+LEFT_OUT: Final = (
+    "The housing is closed: bearings, seals and vents let no sound through. Seats, gears, shafts and oil take no room, "
+    "and the air outside does not load the walls."
+)
+MASS_LAW: Final = (
+    "The mass law is a reference, not a prediction: the transmission loss of limp walls for sound from all directions "
+    "up to 78°. Stiff walls of a small box let less through at low frequencies; where the air inside or the walls "
+    "resonate, and towards the coincidence of bending and sound waves, more goes through."
+)
+
+ROUGH: Final = ((175.0, 20.0), (350.0, 26.0), (525.0, 30.0), (1001.0, 13.0))
+"""Frequency and insertion loss of the project's earlier rough estimate for the paper's drive, give or take `ROUGH_DB`;
+the paper prints none."""
+
+ROUGH_DB: Final = 10.0
+CAPTION: Final = (
+    "Insertion loss at the mesh frequencies; with half and twice the loss factor η of the air inside; least and most "
+    f"with the source there and {1e3 * ASIDE_M:g} mm off along x, y and z"
+)
+_SAME_HZ: Final = 0.01
+_SENSITIVE_DB: Final = 5.0
+"""Change of the insertion loss from which the report names what changes it [assumed]."""
+
+
+def insertion_loss_section(result: FleetPrediction) -> Section | None:
+    """Return the section on the housing's insertion loss; None where no housing is computed."""
+    held = result.prediction.insertion_loss
+    if held is None or not held.frequency_hz.size:
+        return None
+    fleet = result.fleet
+    blocks: list[Block] = [
+        Paragraph(METHOD.format(surface=result.prediction.surface, place=_place_words(fleet, held))),
+        Sentences(
+            [
+                text
+                for text in (_range_words(held), _of_air_words(held), _aside_words(held), _rough_words(fleet, held))
+                if text
+            ]
+        ),
+        FigureBlock(_figure(held), "calculated"),
+        _at_mesh(fleet, held),
+        Details("Third octaves", [_third_octaves(held)]),
+        Sentences([_placement_words(fleet, held), _air_words(held), MASS_LAW, LEFT_OUT]),
+    ]
+    return Section("insertion-loss", "Insertion loss of the housing", blocks)
+
+
+def _place_words(fleet: Fleet, held: InsertionLoss) -> str:
+    x, y, z = (pretty_signs(f"{place:.3g}") for place in held.source_m)
+    where = f"at x = {x}, y = {y}, z = {z} m in the drive's frame"
+    stated = fleet.masuda.placement.value == "inside" and fleet.masuda.position_m is not None
+    return f"{where} ([masuda] position_m)" if stated else f"at the pitch point between the shafts [assumed], {where}"
+
+
+def _known(held: InsertionLoss) -> list[MeshLoss]:
+    return [mesh for mesh in held.at_mesh if mesh.loss_db is not None]
+
+
+def _range_words(held: InsertionLoss) -> str:
+    text = ""
+    if held.band_db.size:
+        low, high = int(np.argmin(held.band_db)), int(np.argmax(held.band_db))
+        text = (
+            f"In third octaves the housing takes {held.band_db[low]:.0f} dB (at {_nominal(held.band_hz[low])} Hz) to "
+            f"{held.band_db[high]:.0f} dB (at {_nominal(held.band_hz[high])} Hz)"
+        )
+    known = _known(held)
+    if known:
+        parts = joined([f"{mesh.loss_db:.0f} dB in condition {mesh.condition}" for mesh in known])
+        text += f"{'; at' if text else 'At'} the mesh frequencies {parts}"
+    beyond = [mesh.condition for mesh in held.at_mesh if mesh.loss_db is None]
+    if beyond:
+        text += (
+            f"{'; of' if text else 'Of'} condition{'s' if len(beyond) > 1 else ''} {joined(beyond)} it is not computed"
+        )
+    return f"{text}."
+
+
+def _of_air_words(held: InsertionLoss) -> str:
+    pairs = [(mesh, mesh.of_air_db) for mesh in _known(held) if mesh.of_air_db is not None]
+    strong = [(mesh, pair) for mesh, pair in pairs if pair[1] - pair[0] > _SENSITIVE_DB]
+    if not pairs:
+        return ""
+    if not strong:
+        return (
+            "From half to twice the loss factor of the air inside it changes by less than 5 dB at the mesh frequencies."
+        )
+    parts = joined([f"from {pair[0]:.0f} to {pair[1]:.0f} dB in condition {mesh.condition}" for mesh, pair in strong])
+    return (
+        "Where the air inside resonates its loss factor decides: from half to twice its value the insertion loss goes "
+        f"{parts}."
+    )
+
+
+def _aside_words(held: InsertionLoss) -> str:
+    pairs = [(mesh, mesh.beside_db) for mesh in _known(held) if mesh.beside_db is not None]
+    strong = [(mesh, pair) for mesh, pair in pairs if pair[1] - pair[0] > _SENSITIVE_DB]
+    if not strong:
+        return ""
+    parts = joined([f"{pair[0]:.0f} to {pair[1]:.0f} dB in condition {mesh.condition}" for mesh, pair in strong])
+    return (
+        f"The place of the source matters too: there and {1e3 * ASIDE_M:g} mm off along x, y or z it is {parts}. A "
+        "symmetric box with the source in its planes of symmetry answers with a part of its modes only."
+    )
+
+
+def _rough_of(fleet: Fleet, mesh: MeshLoss) -> float | None:
+    """The rough estimate at a mesh frequency, for the paper's drive."""
+    if not is_of_the_paper(fleet):
+        return None
+    near = (loss for frequency, loss in ROUGH if abs(frequency - mesh.frequency_hz) <= _SAME_HZ * frequency)
+    return next(near, None)
+
+
+def _rough_words(fleet: Fleet, held: InsertionLoss) -> str:
+    pairs = [(mesh, rough) for mesh in _known(held) if (rough := _rough_of(fleet, mesh)) is not None]
+    if not pairs:
+        return ""
+    within = [mesh.condition for mesh, rough in pairs if abs((mesh.loss_db or 0.0) - rough) <= ROUGH_DB]
+    beyond = [
+        f"{pretty_signs(f'{(mesh.loss_db or 0.0) - rough:+.0f}')} dB in condition {mesh.condition}"
+        for mesh, rough in pairs
+        if mesh.condition not in within
+    ]
+    said = joined([f"{loss:g} dB at {frequency:g} Hz" for frequency, loss in ROUGH])
+    start = f"The project's earlier rough estimate for this drive ({said}, give or take {ROUGH_DB:g} dB)"
+    parts = [f"is met in condition{'s' if len(within) > 1 else ''} {joined(within)}"] if within else []
+    parts += [f"is missed by {joined(beyond)}"] if beyond else []
+    return f"{start} {' and '.join(parts)}; a single line says little where peaks and dips lie this close."
+
+
+def _placement_words(fleet: Fleet, held: InsertionLoss) -> str:
+    losses = [mesh.loss_db for mesh in _known(held) if mesh.loss_db is not None]
+    span = f"{min(losses):.0f} to {max(losses):.0f} dB" if losses else "its insertion loss"
+    level = "Masuda's level is that of gear units measured with their housings"
+    placement = fleet.masuda.placement.value
+    if placement == "inside":
+        return (
+            f'[masuda] placement = "inside", as the paper has it: {level}, and here the housing takes {span} from it a '
+            'second time. With placement = "free" it would take nothing.'
+        )
+    if placement == "off":
+        return f'[masuda] placement = "off": the meshing noise is no part of the total. {level}.'
+    return (
+        f'[masuda] placement = "free": {level}, so the source stands outside and keeps its power; none of this is '
+        f'taken from it. With placement = "inside", as the paper has it, the meshing noise would be lower by {span}.'
+    )
+
+
+def _air_words(held: InsertionLoss) -> str:
+    air = held.air
+    return (
+        f"The air inside has a loss factor of {air.loss_factor:g}, an absorption coefficient of {air.absorption:.2g} "
+        f"at {hertz(air.frequency_hz)}; viscosity and heat conduction at bare walls alone would give a loss factor of "
+        f"{air.bare_walls:.1g}. Gears, shafts, oil mist and leaks make the rest [assumed]."
+    )
+
+
+def _nominal(frequency_hz: float) -> str:
+    """A third octave's name: the middle to the two or three digits of the standard's series."""
+    series = (1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0)
+    number = round(10.0 * np.log10(frequency_hz))
+    return f"{series[number % 10] * 10.0 ** (number // 10):g}"
+
+
+def _figure(held: InsertionLoss) -> Figure:
+    known = _known(held)
+    elements: list[Element] = [Line(held.frequency_hz, held.loss_db, "insertion loss", color=0)]
+    if held.band_hz.size:
+        elements.append(Line(*_steps(held), "its third octaves", color=0, width=2.5, opacity=0.55))
+    elements.append(Line(held.frequency_hz, held.mass_law_db, "mass law, field incidence", style="dashed", color=7))
+    if known:
+        elements.append(
+            Markers(
+                np.array([mesh.frequency_hz for mesh in known]),
+                np.array([mesh.loss_db for mesh in known]),
+                "at mesh frequencies",
+                labels=[mesh.condition for mesh in known],
+                texts=[f"condition {mesh.condition}" for mesh in known],
+                symbol="diamond",
+                color=1,
+            )
+        )
+    return Figure(
+        "insertion-loss",
+        "Insertion loss of the housing over frequency",
+        "Lines 1/48 octave apart; third octaves are means of the radiated energy of equally strong lines. Diamonds "
+        "with the names of the conditions stand at their mesh frequencies. The mass law is the transmission loss of "
+        "limp walls.",
+        Axis("Frequency", "Hz", "log"),
+        Axis("Insertion loss", "dB"),
+        elements,
+    )
+
+
+def _steps(held: InsertionLoss) -> tuple[np.ndarray, np.ndarray]:
+    """The third octaves as a line level from edge to edge of each."""
+    edges = np.outer(held.band_hz, [10.0**-0.05, 10.0**0.05])
+    return edges.ravel(), np.repeat(held.band_db, 2)
+
+
+def _at_mesh(fleet: Fleet, held: InsertionLoss) -> Table:
+    columns = [
+        Column("condition", "Condition"),
+        Column("frequency_hz", "Mesh frequency", "Hz", 1, "number"),
+        Column("insertion_loss_db", "Insertion loss", "dB", 1, "number"),
+        Column("mass_law_db", "Mass law", "dB", 1, "number"),
+        Column("half_air_loss_db", "Air η/2", "dB", 1, "number"),
+        Column("double_air_loss_db", "Air 2η", "dB", 1, "number"),
+        Column("beside_low_db", "Moved: least", "dB", 1, "number"),
+        Column("beside_high_db", "most", "dB", 1, "number"),
+    ]
+    rough = [_rough_of(fleet, mesh) for mesh in held.at_mesh]
+    if any(value is not None for value in rough):
+        columns.insert(3, Column("rough_db", "Rough", f"dB, ± {ROUGH_DB:g}", 0, "number"))
+    rows: list[Sequence[Cell]] = []
+    for mesh, value in zip(held.at_mesh, rough, strict=True):
+        cells: list[Cell] = [mesh.condition, mesh.frequency_hz, mesh.loss_db]
+        cells += [value] if len(columns) > 8 else []
+        rows.append([*cells, mesh.mass_law_db, *(mesh.of_air_db or (None, None)), *(mesh.beside_db or (None, None))])
+    return Table("insertion-loss-at-mesh", CAPTION, columns, rows, origin="calculated")
+
+
+def _third_octaves(held: InsertionLoss) -> Table:
+    columns = (
+        Column("band_hz", "Third octave", "Hz", None, "number"),
+        Column("insertion_loss_db", "Insertion loss", "dB", 1, "number"),
+    )
+    rows = [(float(_nominal(band)), mean) for band, mean in zip(held.band_hz, held.band_db, strict=True)]
+    return Table("insertion-loss-bands", "Insertion loss in third octaves", columns, rows, origin="calculated")

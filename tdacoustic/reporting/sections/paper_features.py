@@ -1,0 +1,168 @@
+"""Another source's numbers and features beside the model's: what is reproduced, and what it depends on."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.sections.printed import is_of_the_paper
+from tdacoustic.results import FleetPrediction
+from tdacoustic.studies import QUANTITIES, FeatureCheck, ReferenceCheck
+from tdacoustic.studies.responses import SCAN_DB, SCAN_FACTORS
+from tdacoustic.studies.words import difference_words, feature_words, margin_words, quantity_words, reference_words
+
+__all__ = ["features_words", "paper_features"]
+
+_UNITS: Final = {"db": "dB", "um": "µm", "n": "N", "hz": "Hz", "deg": "°"}
+
+
+def paper_features(result: FleetPrediction) -> Section | None:
+    """Return the section on another source's numbers and features; None where the fleet states none."""
+    references, features = result.studies.references, result.studies.features
+    if not references and not features:
+        return None
+    of_paper = is_of_the_paper(result.fleet)
+    title = "Printed numbers and features beside the model's" if of_paper else "Other numbers beside the model's"
+    blocks: list[Block] = [Paragraph(_method(result))]
+    if features:
+        blocks.append(Paragraph(f"Of {len(features)} features {_count(features)}."))
+        words = [feature_words(check, result.fleet) for check in features]
+        blocks.append(Sentences([one.statement for one in words]))
+        told = [one.dependence for one in words if one.dependence]
+        inside: list[Block] = [_feature_table(result), Sentences(told)]
+        blocks.append(Details("Margins of the features, and what they depend on", inside))
+    if references:
+        blocks.append(Paragraph(f"Of {len(references)} numbers {_count(references)}."))
+        blocks += [FigureBlock(figure, "calculated") for figure in _figures(result)]
+        blocks.append(_reference_table(result))
+        words = [reference_words(check, result.fleet) for check in references]
+        told = [one.dependence for one in words if one.dependence]
+        blocks += [Details("What the numbers depend on", [Sentences(told)])] if told else []
+    return Section("references", title, blocks)
+
+
+def features_words(result: FleetPrediction) -> str:
+    """Return how many of another source's features the model has, and which not, in a sentence; empty of none."""
+    features = result.studies.features
+    if not features:
+        return ""
+    missing = [check.feature.label for check in features if check.holds is False]
+    text = f"of {len(features)} features that the fleet file states of another source {_count(features)}"
+    return f"{text}: {'; '.join(missing)}" if missing else text
+
+
+def _method(result: FleetPrediction) -> str:
+    low, high = SCAN_FACTORS[0], SCAN_FACTORS[-1]
+    vectors = " of those that need no new transfer vectors" if result.prediction.housing is not None else ""
+    return (
+        "Numbers and features that the fleet file states of another source. A margin is by how much a feature is "
+        "there (below zero: by how much it is missing), in dB where nothing else is said; amplitudes count as 20 lg. "
+        "A number is reproduced where the model is within the tolerance. What a margin or a difference depends on is "
+        "its change for 10 % more of an assumed parameter, or 1 dB more of a level. Each assumed parameter alone"
+        f"{',' + vectors + ',' if vectors else ''} was also moved to {len(SCAN_FACTORS)} values from {low:.2g} to "
+        f"{high:g} times its own (±{SCAN_DB[-1]:g} dB of a level), to see whether it alone could turn the verdict; "
+        "between two such values the place is interpolated."
+    )
+
+
+def _count(checks: tuple[FeatureCheck, ...] | tuple[ReferenceCheck, ...]) -> str:
+    verdicts = [check.holds for check in checks]
+    there, missing, open_ = verdicts.count(True), verdicts.count(False), verdicts.count(None)
+    text = f"{there} {'is' if there == 1 else 'are'} reproduced, {missing} {'is' if missing == 1 else 'are'} not"
+    return text + (f", and {open_} cannot be said" if open_ else "")
+
+
+def _verdict(holds: bool | None) -> str:
+    return "not determined" if holds is None else "reproduced" if holds else "not reproduced"
+
+
+def _feature_table(result: FleetPrediction) -> Table:
+    columns = (
+        Column("feature", "Feature"),
+        Column("verdict", "Verdict", kind="verdict"),
+        Column("margin", "Margin", align="right"),
+        Column("origin", "Where it comes from"),
+    )
+    rows: list[list[Cell]] = []
+    for check in result.studies.features:
+        rows.append([check.feature.label, _verdict(check.holds), margin_words(check), check.feature.origin])
+    return Table("features", "Features of another source in the model", columns, rows, origin="calculated")
+
+
+def _reference_table(result: FleetPrediction) -> Table:
+    columns = (
+        Column("number", "Number"),
+        Column("unit", "Unit"),
+        Column("reference_value", "Printed", "", None, "number"),
+        Column("model_value", "Model", "", None, "number"),
+        Column("difference", "Difference", align="right"),
+        Column("verdict", "Verdict", kind="verdict"),
+        Column("origin", "Where it comes from"),
+    )
+    rows: list[list[Cell]] = []
+    for check in result.studies.references:
+        held = check.reference
+        names = held.condition or ()
+        where = f"condition {' or '.join(names)}" if names else f"helix angle {held.helix_angle_deg:g}°"
+        if len(names) > 1 and check.case is not None:
+            where += f" (here {check.case.name})"
+        quantity = quantity_words(held.quantity, result.fleet)
+        number = f"{quantity[:1].upper()}{quantity[1:]}, {where}{', measured' if held.kind == 'measured' else ''}"
+        unit = _UNITS[held.quantity.rpartition("_")[2]]
+        value = None if math.isnan(check.value) else float(f"{check.value:.4g}")
+        off = difference_words(check)
+        rows.append([number, unit, held.value, value, off, _verdict(check.holds), held.origin])
+    return Table("reference-numbers", "Numbers of another source and the model's", columns, rows)
+
+
+def _figures(result: FleetPrediction) -> list[Figure]:
+    """Quantities with numbers of several conditions, over speed."""
+    found = []
+    for quantity in dict.fromkeys(check.reference.quantity for check in result.studies.references):
+        checks = [
+            check
+            for check in result.studies.references
+            if check.reference.quantity == quantity and check.case is not None and check.case.over == "conditions"
+        ]
+        if len({check.case.name for check in checks if check.case is not None}) > 1:
+            found.append(_figure(result, quantity, checks))
+    return found
+
+
+def _figure(result: FleetPrediction, quantity: str, checks: list[ReferenceCheck]) -> Figure:
+    responses = result.studies.responses
+    assert responses is not None  # there are checks
+    held = [place for place, case in enumerate(responses.cases) if case.over == "conditions"]
+    held.sort(key=lambda place: responses.cases[place].value)
+    speeds = np.array([responses.cases[place].value for place in held])
+    own = responses.base[held, QUANTITIES.index(quantity)]
+    elements: list[Element] = [Line(speeds, own, "this model", color=7, points=True)]
+    for kind, name, slot in (("model", "printed, of a model", 1), ("measured", "printed, measured", 0)):
+        of_kind = [check for check in checks if check.reference.kind == kind]
+        if of_kind:
+            at = [check.case.value for check in of_kind if check.case is not None]
+            values = [check.reference.value for check in of_kind]
+            texts = [check.reference.origin for check in of_kind]
+            symbol = "diamond" if kind == "model" else "square"
+            elements.append(Markers(at, values, name, texts=texts, symbol=symbol, color=slot))  # type: ignore[arg-type]
+    words, unit = quantity_words(quantity, result.fleet), _UNITS[quantity.rpartition("_")[2]]
+    label = f"{words[:1].upper()}{words[1:]}"
+    reference = "20 µPa" if quantity.endswith("_db") and quantity != "range_12m_db" else None
+    name = f"reference-{quantity.replace('_', '-')}"
+    caption = "Points are numbers of another source, the line is this model."
+    axis = Axis(label, unit, reference=reference)
+    return Figure(name, f"{label}, printed and of this model", caption, Axis("Train speed", "km/h"), axis, elements)

@@ -1,0 +1,144 @@
+"""What the levels depend on: how much they change with single parameters of the fleet."""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from tdacoustic.fleet import Fleet
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Section,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.parameters import value_words
+from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.results import FleetPrediction
+from tdacoustic.studies import Sensitivity, Variation
+from tdacoustic.studies.responses import SILENT, STEP_DB, STEP_RELATIVE, VECTORS
+from tdacoustic.studies.sensitivity import per_words
+from tdacoustic.studies.words import number_words
+
+__all__ = ["sensitivity"]
+
+MOST_BARS: Final = 10
+_OVER: Final = {"conditions": "over the conditions", "helix": "over the helix angles"}
+
+
+def sensitivity(result: FleetPrediction) -> Section | None:
+    """Return the section on sensitivities; None where nothing was varied."""
+    found = result.studies.sensitivity
+    if found is None or not found.varied:
+        return None
+    surface = result.prediction.surface
+    blocks: list[Block] = [Paragraph(_method(surface))]
+    ranking = found.ranking()[:MOST_BARS]
+    if ranking:
+        blocks.append(Paragraph(_ranking_words(result.fleet, found, ranking)))
+        blocks.append(FigureBlock(_figure(result, found, ranking), "calculated"))
+    if found.rattling:
+        blocks.append(Notice("info", _rattling_words(found)))
+    blocks.append(Details("Changes of the total, by parameter", [_table(result, found)]))
+    blocks += _left_out(result.fleet, found)
+    return Section("sensitivity", "What the levels depend on", blocks)
+
+
+def _method(surface: str) -> str:
+    return (
+        f"Change of the level at {surface} when a single parameter moves and all others stay, from central differences "
+        f"of ±{100.0 * STEP_RELATIVE:g} % of the parameter (±{STEP_DB:g} dB of a level) and told for 10 % more of it "
+        "(for 1 dB more of a level). Of a table over speed all rows move together. This is the slope here: near a "
+        "resonance a larger change can do much more, or the opposite."
+    )
+
+
+def _rattling_words(found: Sensitivity) -> str:
+    told = [f"condition {case.name}" if case.over == "conditions" else f"{case.name}°" for case in found.rattling]
+    return (
+        f"At {joined(told)} the harmonic balance finds no stable motion when some of the gears' parameters move: these "
+        "changes are left out there, as each would take an integration in time over seconds."
+    )
+
+
+def _ranking_words(fleet: Fleet, found: Sensitivity, ranking: tuple[int, ...]) -> str:
+    strongest = found.strongest("conditions")
+    told = [
+        f"{number_words(found.varied[place].key, fleet)} "
+        f"({strongest[place]:+.1f} dB for {per_words(found.varied[place].kind)})"
+        for place in ranking[:3]
+    ]
+    return pretty_signs(
+        sentence(f"of the assumed parameters the total depends most on {joined(told)}: the largest changes over speed")
+    )
+
+
+def _figure(result: FleetPrediction, found: Sensitivity, ranking: tuple[int, ...]) -> Figure:
+    shown = [found.varied[place] for place in ranking]
+    names = [
+        number_words(variation.key, result.fleet) + (f" ({_per(variation)})" if variation.kind == "level" else "")
+        for variation in shown
+    ]
+    held = [over for over in _OVER if found.of_total(over).shape[1]]
+    bars = [Bars(names, found.strongest(over)[list(ranking)], _OVER[over]) for over in held]
+    return Figure(
+        "sensitivity",
+        "Assumed parameters that the total depends on most",
+        f"Change of the total at {result.prediction.surface} for 10 % more, the largest in size {_or(held)}.",
+        Axis("Parameter"),
+        Axis("Change of the level", "dB"),
+        bars,
+        height=460,
+    )
+
+
+def _or(held: list[str]) -> str:
+    return " or ".join(_OVER[over] for over in held)
+
+
+def _per(variation: Variation) -> str:
+    return per_words(variation.kind)
+
+
+def _table(result: FleetPrediction, found: Sensitivity) -> Table:
+    columns = [
+        Column("parameter", "Parameter"),
+        Column("value", "Value"),
+        Column("origin", "Where it comes from"),
+        Column("per", "For"),
+    ]
+    for over in _OVER:
+        for case in found.cases:
+            if case.over == over:
+                title = case.name if over == "conditions" else f"{case.name}°"
+                columns.append(Column(f"{over}_{case.name}", title, "dB", 2, "number"))
+    order = sorted(range(len(found.varied)), key=lambda place: -abs(found.strongest("conditions")[place]))
+    rows: list[list[Cell]] = []
+    for place in order:
+        variation = found.varied[place]
+        value = "over speed" if variation.value is None else value_words(variation.key, variation.value)
+        changes = [float(change) for over in _OVER for change in found.of_total(over)[place]]
+        cells: list[Cell] = [None if math.isnan(change) else change for change in changes]
+        rows.append([variation.key, value, variation.origin, _per(variation), *cells])
+    caption = f"Change of the total at {result.prediction.surface}, by condition and helix angle"
+    return Table("sensitivity-total", caption, columns, rows, origin="calculated")
+
+
+def _left_out(fleet: Fleet, found: Sensitivity) -> list[Block]:
+    """Parameters that were not varied, by reason."""
+    by_reason: dict[str, list[str]] = {}
+    for left in found.left_out:
+        by_reason.setdefault(left.reason, []).append(left.key)
+    if not by_reason:
+        return []
+    order = sorted(by_reason, key=lambda reason: (reason != VECTORS, reason != SILENT, reason))
+    rows: list[list[Cell]] = [[key, reason] for reason in order for key in by_reason[reason]]
+    columns = (Column("parameter", "Parameter"), Column("reason", "Why not"))
+    return [Details("Parameters not varied", [Table("not-varied", "Parameters not varied", columns, rows)])]

@@ -1,0 +1,372 @@
+"""What changes of the drive do to its levels: a sentence a speed, what to begin with, and how sure that is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from tdacoustic.drive.what_if import STEPS_DB, WhatIfAnswer, WhatIfLevel, off_name, step_name
+from tdacoustic.fleet import WhatIf
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Bars, Element, Figure, Markers
+from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.results import FleetPrediction
+
+__all__ = ["what_if_line", "what_if_of", "what_if_section"]
+
+SOURCES: Final = {"motor": "the motor", "mesh": "the meshing noise", "structure": "the structure"}
+SLOTS: Final = {"motor": 0, "mesh": 1, "structure": 2}
+
+MOST_NAMED: Final = 4
+MOST_DRAWN: Final = 6
+"""Cases of the fleet that a sentence names, and that the figure shows; the table has all."""
+
+LITTLE_DB: Final = 1.0
+"""What a source left out takes off, below which others come first [assumed]."""
+
+SMALLEST_DB: Final = 0.05
+"""Changes that are none at the decimals shown."""
+
+ALONE: Final = "is all that sounds, each decibel less of it is one less at"
+
+_GROUP: Final = 0.68
+"""Part of a category that its bars take together, in both renderers."""
+
+
+def what_if_of(result: FleetPrediction) -> Section | None:
+    """Return the section of a prediction; None where nothing was asked."""
+    return None if result.what_if is None else what_if_section(result.what_if)
+
+
+def what_if_section(answer: WhatIfAnswer) -> Section | None:
+    """Return the section on what changes of the drive do; None where it is silent throughout."""
+    conditions = _conditions(answer)
+    if not answer.paths or not conditions:
+        return None
+    blocks: list[Block] = [Paragraph(_cases_words(answer))]
+    blocks.append(Sentences([_condition_words(answer, levels) for levels in conditions]))
+    over = [text for text in (_first_words(answer, conditions), _little_words(answer, conditions)) if text]
+    blocks += [Sentences(over)] if over else []
+    blocks.append(Paragraph(_interval_words(answer)))
+    blocks += [Notice("warning", text) for text in _open_words(answer)]
+    figure = _figure(answer, conditions)
+    blocks += [] if figure is None else [FigureBlock(figure, "calculated")]
+    near = [level for levels in conditions for level in levels]
+    blocks.append(_table(answer, "what-if-surface", f"Changes at {answer.surface}, unweighted", near))
+    whole = _table(answer, "what-if", "All receivers, unweighted and A-weighted", answer.levels)
+    blocks.append(Details("All receivers, unweighted and A-weighted", [whole]))
+    return Section("what-if", "What it brings to quieten a source", blocks)
+
+
+def what_if_line(answer: WhatIfAnswer | None) -> str:
+    """Return the slowest and the fastest speed of the answer in a line of text; empty without one."""
+    conditions = [] if answer is None else _conditions(answer)
+    if answer is None or not conditions or not answer.paths:
+        return ""
+    ends = conditions[:1] if len(conditions) == 1 else [conditions[0], conditions[-1]]
+    parts = []
+    for levels in ends:
+        alone = _alone(answer, levels)
+        said = (
+            "; ".join(_effects(answer, levels, with_off=False))
+            if alone is None
+            else f"{SOURCES[alone]} {ALONE} {answer.surface}"
+        )
+        parts.append(f"at {levels[0].train_speed_km_h:.4g} km/h {said}")
+    said = ". ".join([parts[0], *(sentence(part).rstrip(".") for part in parts[1:])])
+    return f"What if (level at {answer.surface}): {said}."
+
+
+def _conditions(answer: WhatIfAnswer) -> list[list[WhatIfLevel]]:
+    """Unweighted levels at the surface, those of each condition together, by speed."""
+    found: dict[str, list[WhatIfLevel]] = {}
+    for level in answer.levels:
+        if (level.receiver, level.weighting) == (answer.surface, "Z") and level.before_db is not None:
+            found.setdefault(level.condition, []).append(level)
+    return sorted(found.values(), key=lambda levels: levels[0].train_speed_km_h)
+
+
+def _cases_words(answer: WhatIfAnswer) -> str:
+    if not answer.assumed:
+        cases = joined([f"{_quoted(case.name)} ({_case_words(case)})" for case in answer.cases])
+        return f"The cases are those of the fleet's [[what_if]]: {cases}."
+    steps = joined([f"{abs(step):g}" for step in STEPS_DB])
+    return (
+        f"The fleet asks for no case of its own ([[what_if]]): each source of the total is taken {steps} dB down "
+        "[assumed steps] and left out."
+    )
+
+
+def _quoted(name: str) -> str:
+    return f"\N{LEFT DOUBLE QUOTATION MARK}{name}\N{RIGHT DOUBLE QUOTATION MARK}"
+
+
+def _case_words(case: WhatIf) -> str:
+    """What a case changes."""
+    changes = {path: case.gain_db(path) for path in case.stated_paths}
+    parts = [f"{path} off" if change == -math.inf else f"{path} {change:+g} dB" for path, change in changes.items()]
+    parts += [f"{key} = {_value_words(value)}" for key, value in case.parameters]
+    only = "" if case.conditions is None else f", in {_names(case.conditions)} only"
+    return pretty_signs(", ".join(parts)) + only
+
+
+def _value_words(value: Any) -> str:
+    if isinstance(value, tuple):
+        return f"[{', '.join(_value_words(entry) for entry in value)}]"
+    return f"{value:g}"
+
+
+# ---------------------------------------------------------------- a condition
+
+
+def _where(levels: Sequence[WhatIfLevel]) -> str:
+    return f"condition {levels[0].condition} ({levels[0].train_speed_km_h:.4g} km/h)"
+
+
+def _condition_words(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel]) -> str:
+    before = levels[0].before_db
+    start = f"{_where(levels)}, {before:.1f} dB at {answer.surface}"
+    alone = _alone(answer, levels)
+    if alone is not None:
+        return sentence(f"{start}: {SOURCES[alone]} {ALONE} {answer.surface}")
+    return sentence(f"{start}: {'; '.join(_effects(answer, levels))}")
+
+
+def _alone(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel]) -> str | None:
+    """The path that alone sounds in a condition, where the usual cases show it."""
+    held = {level.case: level for level in levels}
+    for path in answer.paths if answer.assumed else ():
+        if off_name(path) in held and held[off_name(path)].level_db is None:
+            return path
+    return None
+
+
+def _effects(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel], with_off: bool = True) -> list[str]:
+    """What each case does in a condition: of the usual ones the larger step, and without the source."""
+    held = {level.case: level for level in levels}
+    if not answer.assumed:
+        said = [f"{_quoted(name)} {_effect(held[name])}" for name in list(held)[:MOST_NAMED]]
+        return [*said, "more in the table"] if len(held) > MOST_NAMED else said
+    found = []
+    for path in answer.paths:
+        step = held[step_name(path, STEPS_DB[0])]
+        off = held[off_name(path)].change_db
+        text = f"{abs(STEPS_DB[0]):g} dB less from {SOURCES[path]} {_effect(step)}"
+        if with_off and off is not None and (step.change_db or 0.0) - off >= SMALLEST_DB:
+            text += f", {-off:.1f} dB if it were silent"
+        found.append(text)
+    return found
+
+
+def _effect(level: WhatIfLevel) -> str:
+    """A change in words, with its interval."""
+    change, ends = level.change_db, level.change_95_db
+    if change is None:
+        return "leaves nothing that sounds"
+    low, high = (change, change) if ends is None else ends
+    if low < -SMALLEST_DB and high > SMALLEST_DB:
+        return pretty_signs(f"changes it by {change:+.1f} dB ({low:+.1f} to {high:+.1f})")
+    if abs(change) < SMALLEST_DB and max(-low, high) < SMALLEST_DB:
+        return "changes nothing"
+    rises = high > SMALLEST_DB
+    first, last = (low, high) if rises else (-high, -low)
+    between = [f"{abs(max(end, 0.0)):.1f}" for end in (first, last)]  # no "-0.0"
+    within = f" ({' to '.join(between)})" if len({*between, f"{abs(change):.1f}"}) > 1 else ""
+    return f"adds {abs(change):.1f} dB{within}" if rises else f"takes {abs(change):.1f} dB{within} off"
+
+
+# ---------------------------------------------------------------- over the conditions
+
+
+def _first_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -> str:
+    """From which source most is gained, and where the intervals leave that open; empty of one source."""
+    if not answer.assumed or len(answer.paths) < 2:
+        return ""
+    named: dict[str, list[str]] = {}
+    unsure = []
+    for levels in conditions:
+        held = {level.case: level for level in levels}
+        steps = {path: held[step_name(path, STEPS_DB[0])] for path in answer.paths}
+        ranked = sorted(answer.paths, key=lambda path: steps[path].change_db or 0.0)
+        named.setdefault(ranked[0], []).append(levels[0].condition)
+        if _overlap(steps[ranked[0]], steps[ranked[1]]):
+            unsure.append(levels[0].condition)
+    parts = [f"at {SOURCES[path]} in {_names(names)}" for path, names in named.items()]
+    text = f"{abs(STEPS_DB[0]):g} dB less bring most {joined(parts)}"
+    if unsure and answer.basis is not None:
+        text += f"; in {_names(unsure)} the intervals overlap, and which source to begin with is not decided"
+    return sentence(text)
+
+
+def _overlap(first: WhatIfLevel, second: WhatIfLevel) -> bool:
+    if first.change_95_db is None or second.change_95_db is None:
+        return False
+    return first.change_95_db[1] > second.change_95_db[0]
+
+
+def _little_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -> str:
+    """Where a source left out altogether takes next to nothing off, so that others come first; empty of nowhere."""
+    if not answer.assumed or len(answer.paths) < 2:
+        return ""
+    little: dict[str, list[str]] = {}
+    for levels in conditions:
+        held = {level.case: level for level in levels}
+        for path in answer.paths:
+            off = held[off_name(path)].change_db
+            if off is not None and -off < LITTLE_DB:
+                little.setdefault(path, []).append(levels[0].condition)
+    if not little:
+        return ""
+    parts = [f"{SOURCES[path]} in {_names(names)}" for path, names in little.items()]
+    return sentence(
+        f"left out altogether, less than {LITTLE_DB:g} dB is gained from {joined(parts)}: others come first"
+    )
+
+
+def _names(names: Sequence[str]) -> str:
+    return f"condition{'s' if len(names) > 1 else ''} {joined(names)}"
+
+
+# ---------------------------------------------------------------- how sure
+
+
+def _interval_words(answer: WhatIfAnswer) -> str:
+    basis = answer.basis
+    if basis is None:
+        return (
+            "There is no interval: without a calibration the levels of the sources stand as the fleet's values make "
+            "them, and nothing says how far these are off."
+        )
+    method = "the range over" if basis.method == "profile" else "2.5 and 97.5 % quantiles over"
+    how = "that the data allow (profile likelihood)" if basis.method == "profile" else "out of the posterior"
+    fitted = (
+        f"all values of {joined(basis.parameters)} {how}" if basis.parameters else "no parameter, as none was fitted"
+    )
+    scatter = (
+        f", together with the model's scatter of {basis.model_sigma_db:.2g} dB as an error of each source by itself in "
+        "each condition [ours]"
+        if basis.model_sigma_db > 0.0
+        else ""
+    )
+    alone = (
+        " If the sources are off alike, the interval of the fitted parameters alone holds; the table has it too."
+        if basis.model_sigma_db > 0.0
+        else ""
+    )
+    return (
+        f"In brackets: intervals of 95 %, {method} {fitted}{scatter}.{alone} Not in them is what parameters that were "
+        "not fitted are off by beyond that, sound that the model does not have, and whether a measure keeps what it "
+        "promises. Where a level was measured the change is to be added to it: the levels in the table are the model's."
+    )
+
+
+def _open_words(answer: WhatIfAnswer) -> list[str]:
+    held = () if answer.basis is None else answer.basis.open_parameters
+    if not held:
+        return []
+    bounds = "their bounds hold" if len(held) > 1 else "its bounds hold"
+    return [f"The data do not determine {joined(held)}: {bounds} these intervals, as far as they depend on it."]
+
+
+# ---------------------------------------------------------------- figure and tables
+
+
+def _figure(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -> Figure | None:
+    """Bars of what is taken off, with intervals, and marks of what a source left out would take off."""
+    shown: list[tuple[str, int | None, str | None]]
+    if answer.assumed:
+        shown = [(step_name(path, STEPS_DB[0]), SLOTS[path], off_name(path)) for path in answer.paths]
+    else:
+        shown = [(case.name, None, None) for case in answer.cases[:MOST_DRAWN]]
+    places = [f"{levels[0].condition} ({levels[0].train_speed_km_h:.4g} km/h)" for levels in conditions]
+    elements: list[Element] = []
+    marked: list[np.ndarray] = []
+    wide = _GROUP / len(shown)
+    for number, (name, slot, off) in enumerate(shown):
+        held = [_of_case(levels, name) for levels in conditions]
+        elements.append(Bars(places, _off_db(held), name, _lengths(held), slot))
+        if off is not None:
+            x = np.arange(len(places)) - 0.5 * _GROUP + (number + 0.5) * wide
+            marked.append(np.stack([x, _off_db([_of_case(levels, off) for levels in conditions])]))
+    if marked:
+        x, most = np.concatenate(marked, axis=1)
+        elements.append(Markers(x, most, "the source left out", symbol="x", color=7))
+    if all(not np.isfinite(element.values).any() for element in elements if isinstance(element, Bars)):
+        return None
+    lines = [] if answer.basis is None else ["Lines are intervals of 95 %."]
+    marks = ["A cross is missing where nothing is left that sounds."] if answer.assumed else []
+    return Figure(
+        "what-if-over-speed",
+        f"What changes take off the level at {answer.surface}",
+        " ".join(["One group a condition, by speed.", *lines, *marks]),
+        Axis("Condition"),
+        Axis("Less at " + answer.surface, "dB"),
+        elements,
+    )
+
+
+def _of_case(levels: Iterable[WhatIfLevel], name: str) -> WhatIfLevel | None:
+    return next((level for level in levels if level.case == name), None)
+
+
+def _off_db(levels: Sequence[WhatIfLevel | None]) -> np.ndarray:
+    changes = [None if level is None else level.change_db for level in levels]
+    return np.array([math.nan if change is None else -change for change in changes])
+
+
+def _lengths(levels: Sequence[WhatIfLevel | None]) -> np.ndarray | None:
+    """Lengths of the error bars below and above; None without any interval."""
+    below, above = np.full(len(levels), math.nan), np.full(len(levels), math.nan)
+    for number, level in enumerate(levels):
+        if level is not None and level.change_95_db is not None and level.change_db is not None:
+            low, high = level.change_95_db
+            below[number], above[number] = high - level.change_db, level.change_db - low
+    return np.stack([below, above]) if np.isfinite(below).any() else None
+
+
+def _table(answer: WhatIfAnswer, name: str, caption: str, levels: Iterable[WhatIfLevel]) -> Table:
+    with_ends = answer.basis is not None
+    everywhere = name == "what-if"
+    columns = [
+        Column("condition", "Condition"),
+        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
+        *((Column("receiver", "At"), Column("weighting", "Weighting")) if everywhere else ()),
+        Column("case", "Case"),
+        Column("before_db", "As it is", "dB", 1, "number"),
+        Column("level_db", "Then", "dB", 1, "number"),
+        Column("change_db", "Change", "dB", 1, "number"),
+    ]
+    if with_ends:
+        columns += [
+            Column("change_low_db", "95 % from", "dB", 1, "number"),
+            Column("change_high_db", "to", "dB", 1, "number"),
+            Column("fit_change_low_db", "Fit alone from", "dB", 1, "number"),
+            Column("fit_change_high_db", "to", "dB", 1, "number"),
+            Column("level_low_db", "Level 95 % from", "dB", 1, "number"),
+            Column("level_high_db", "to", "dB", 1, "number"),
+        ]
+    rows: list[list[Cell]] = []
+    for level in levels:
+        row: list[Cell] = [level.condition, level.train_speed_km_h]
+        row += [level.receiver, level.weighting] if everywhere else []
+        row += [level.case, level.before_db, level.level_db, level.change_db]
+        ends = (level.change_95_db, level.fit_95_db, level.level_95_db) if with_ends else ()
+        for pair in ends:
+            row += [None, None] if pair is None else list(pair)
+        rows.append(row)
+    return Table(name, caption, columns, rows, csv=f"{name}.csv" if everywhere else None, origin="calculated")

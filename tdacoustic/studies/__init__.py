@@ -1,0 +1,42 @@
+"""Studies of a drive model: design sweeps, sensitivities, and another source's numbers and features beside its own."""
+
+from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel, CaseValues, conditions_under
+from tdacoustic.studies.checks import (
+    FeatureCheck,
+    Findings,
+    Influence,
+    Move,
+    ReferenceCheck,
+    check_feature,
+    check_reference,
+)
+from tdacoustic.studies.design_sweeps import SweepResult, points_of
+from tdacoustic.studies.responses import Responses
+from tdacoustic.studies.result import Studies
+from tdacoustic.studies.sensitivity import PATHS, Sensitivity, sensitivity_of
+from tdacoustic.studies.variations import LeftOut, Variation, variations_of
+
+__all__ = [
+    "PATHS",
+    "QUANTITIES",
+    "Case",
+    "CaseModel",
+    "CaseValues",
+    "FeatureCheck",
+    "Findings",
+    "Influence",
+    "LeftOut",
+    "Move",
+    "ReferenceCheck",
+    "Responses",
+    "Sensitivity",
+    "Studies",
+    "SweepResult",
+    "Variation",
+    "check_feature",
+    "check_reference",
+    "conditions_under",
+    "points_of",
+    "sensitivity_of",
+    "variations_of",
+]

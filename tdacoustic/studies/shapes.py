@@ -1,0 +1,108 @@
+"""What a series of levels looks like, as a margin: how far it is from losing, or from having, a shape."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["LEAST_VALUES", "direction_margin", "extreme_margin", "shape_margin", "span_margin"]
+
+Real = NDArray[np.float64]
+
+LEAST_VALUES: Final = {"rises": 2, "falls": 2, "flat": 2, "rises_then_falls": 3, "flat_or_rises_then_falls": 3}
+"""Values that a series must have at least to have a shape."""
+
+
+def shape_margin(shape: str, values: Real, tolerance: float) -> Real:
+    """Return by how much series have a shape: zero or above where they have it, below by what they lack.
+
+    With first, last, largest and smallest value of a series and its tolerance t, the margin is the least of
+
+    - ``rises``: last - first - t; t - (largest - last); t - (first - smallest);
+    - ``falls``: first - last - t; t - (largest - first); t - (last - smallest);
+    - ``rises_then_falls``: peak - first - t; peak - last - t, the peak being the best of the values between first and
+      last (others may dip);
+    - ``flat_or_rises_then_falls``: peak - first + t; peak - last - t, with such a peak;
+    - ``flat``: t - (largest - smallest).
+
+    Parameters
+    ----------
+    shape : str
+    values : ndarray, shape (..., n)
+        In order.
+    tolerance : float
+
+    Returns
+    -------
+    ndarray, shape (...)
+        NaN of a series with a gap, or with fewer values than `LEAST_VALUES`.
+    """
+    if values.shape[-1] < LEAST_VALUES[shape]:
+        return np.full(values.shape[:-1], np.nan)
+    first, last = values[..., 0], values[..., -1]
+    high, low = values.max(axis=-1), values.min(axis=-1)
+    if shape == "flat":
+        return np.asarray(tolerance - (high - low))
+    if shape == "rises":
+        return _least(last - first - tolerance, tolerance - (high - last), tolerance - (first - low))
+    if shape == "falls":
+        return _least(first - last - tolerance, tolerance - (high - first), tolerance - (last - low))
+    after_first = tolerance if shape == "flat_or_rises_then_falls" else -tolerance
+    between = values[..., 1:-1]
+    peaks = np.minimum(between - first[..., None] + after_first, between - last[..., None] - tolerance)
+    return np.asarray(peaks.max(axis=-1))
+
+
+def extreme_margin(values: Real, at: NDArray[np.bool_], highest: bool, tolerance: float) -> Real:
+    """Return by how much the highest (lowest) value stands at one of some places: its lead over the others.
+
+    Parameters
+    ----------
+    values : ndarray, shape (..., n)
+    at : ndarray of bool, shape (n,)
+        Some, and not all.
+    highest : bool
+    tolerance : float
+        By which another one may lead.
+
+    Returns
+    -------
+    ndarray, shape (...)
+        NaN of a series with a gap.
+    """
+    if not at.any() or at.all():
+        return np.full(values.shape[:-1], np.nan)
+    of = values if highest else -values
+    lead = of[..., at].max(axis=-1) - of[..., ~at].max(axis=-1)
+    return np.asarray(np.where(np.isfinite(values).all(axis=-1), lead + tolerance, np.nan))
+
+
+def span_margin(values: Real, span: float, tolerance: float) -> Real:
+    """Return by how much the span from least to most is within a tolerance of a stated one."""
+    if values.shape[-1] < 2:
+        return np.full(values.shape[:-1], np.nan)
+    return np.asarray(tolerance - np.abs(values.max(axis=-1) - values.min(axis=-1) - span))
+
+
+def direction_margin(values_deg: Real, direction_deg: float, tolerance: float) -> Real:
+    """Return by how much directions are within a tolerance of a stated one, that which is farthest off.
+
+    Parameters
+    ----------
+    values_deg : ndarray, shape (..., n)
+    direction_deg, tolerance : float
+
+    Returns
+    -------
+    ndarray, shape (...)
+    """
+    if not values_deg.shape[-1]:
+        return np.full(values_deg.shape[:-1], np.nan)
+    off = np.abs((values_deg - direction_deg + 180.0) % 360.0 - 180.0)
+    return np.asarray(tolerance - off.max(axis=-1))
+
+
+def _least(*parts: Real) -> Real:
+    return np.asarray(np.min(np.stack(parts), axis=0))

@@ -1,0 +1,139 @@
+"""``[[sweep]]``, ``[[reference]]`` and ``[[feature]]`` in a fleet's file."""
+
+from pathlib import Path
+
+import pytest
+from plain_fleets import plain_fleet
+
+from tdacoustic.errors import FleetError
+from tdacoustic.fleet import fleet_toml, load_fleet
+
+ROOT = Path(__file__).resolve().parents[2]
+
+ASKED = """
+[[sweep]]
+name = "Damping and width"
+conditions = ["1", 3]
+[sweep.parameters]
+"gear_dynamics.mesh_damping_ratio" = [0.02, 0.05]
+"gear_pair.1.face_width_mm" = [100, 120, 140]
+"model.gear_path" = ["masuda", "sum"]
+
+[[reference]]
+quantity = "spl_4m_db"
+condition = ["4", "5"]
+value = 88
+kind = "measured"
+tolerance = 2
+origin = "a book"
+
+[[reference]]
+quantity = "dte_pp_um"
+helix_angle_deg = 8
+value = 14.8
+origin = "a book"
+
+[[feature]]
+name = "Level"
+quantity = "spl_4m_db"
+shape = "highest_at"
+at = ["4", "5"]
+origin = "a book"
+
+[[feature]]
+quantity = "spl_4m_db"
+over = "helix"
+shape = "lowest_at"
+at = [12, 0.1]
+origin = "a book"
+"""
+
+
+@pytest.fixture
+def load(tmp_path):
+    def of_text(more):
+        path = tmp_path / "fleet.toml"
+        head = plain_fleet("crrc-freight").read_text(encoding="utf-8")
+        path.write_text(head + more, encoding="utf-8")
+        return load_fleet(path)
+
+    return of_text
+
+
+def test_what_is_asked_is_read(load):
+    fleet = load(ASKED)
+    (sweep,) = fleet.sweep
+    assert sweep.n_points == 12
+    assert sweep.conditions == ("1", "3")
+    assert [one.condition for one in fleet.reference] == [("4", "5"), None]
+    assert [one.tolerated for one in fleet.reference] == [2.0, 1.0]
+    assert [one.label for one in fleet.feature] == ["Level", "spl_4m_db lowest at over the helix angles"]
+    assert fleet.feature[1].at == ("12", "0.1")
+    assert not any(stated.key.startswith(("sweep", "reference", "feature")) for stated in fleet.parameters())
+
+
+def test_it_is_written_as_it_was_and_stays_with_a_changed_fleet(load, tmp_path):
+    fleet = load(ASKED)
+    again = tmp_path / "again.toml"
+    again.write_text(fleet_toml(fleet), encoding="utf-8")
+    assert load_fleet(again) == fleet
+    changed = fleet.replaced({"masuda.constant_db": 1.0})
+    assert (changed.sweep, changed.reference, changed.feature) == (fleet.sweep, fleet.reference, fleet.feature)
+
+
+def one_sweep(parameters, more=""):
+    return f'[[sweep]]\nname = "one"\nparameters = {{ {parameters} }}\n{more}'
+
+
+def one_feature(more):
+    return f'[[feature]]\nquantity = "spl_4m_db"\norigin = "a book"\n{more}\n'
+
+
+def one_reference(more):
+    return f'[[reference]]\norigin = "a book"\n{more}\n'
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        (one_sweep('"gear_dynamics.mesh_damping" = ["always"], "gear_dynamics.mesh_dampin_ratio" = [0.1]'),
+         r"\[\[sweep\]\] 'one': unknown parameter 'gear_dynamics.mesh_dampin_ratio'; the nearest known one is "
+         r"'gear_dynamics.mesh_damping_ratio'"),
+        (one_sweep('"gear_dynamics.mass_kg.3" = [1.0]'), r"\[\[sweep\]\] 'one': gear_dynamics.mass_kg.3: "),
+        (one_sweep('"masuda.constant_db" = [20, 20]'), r"parameters names 20 twice for 'masuda.constant_db'"),
+        (one_sweep('"masuda.constant_db" = 20'), r"must have a list of values for 'masuda.constant_db', got 20"),
+        (one_sweep(""), r"parameters must be a table of lists"),
+        (one_sweep('"masuda.constant_db" = [1]', 'conditions = ["7"]'), r"there is no condition '7'; the nearest is"),
+        (one_sweep('"masuda.constant_db" = [1]') + one_sweep('"masuda.constant_db" = [2]'),
+         r"\[\[sweep\]\]: the name 'one' stands twice"),
+        (one_sweep('"masuda.constant_db" = [1]', 'condition = ["1"]'), r"unknown key 'condition' in \[\[sweep\]\]"),
+        (one_reference('quantity = "spl_db"\ncondition = "1"\nvalue = 1'), r"quantity must be one of spl_4m_db, "),
+        (one_reference('quantity = "spl_4m_db"\nvalue = 1'), r"one of condition and helix_angle_deg must be given"),
+        (one_reference('quantity = "spl_4m_db"\ncondition = "9"\nvalue = 1'), r"there is no condition '9'"),
+        (one_reference('quantity = "spl_4m_db"\nhelix_angle_deg = 5\nvalue = 1'), r"there is no helix angle 5°"),
+        (one_reference('quantity = "dte_pp_um"\ncondition = "1"\nvalue = 0'), r"value must be > 0 for dte_pp_um"),
+        (one_reference('quantity = "pattern"\ncondition = "1"\nvalue = 1'), r"'pattern' has no value to refer to"),
+        ('[[reference]]\nquantity = "spl_4m_db"\ncondition = "1"\nvalue = 1\n', r"origin is missing"),
+        (one_feature('shape = "rise"'), r"shape must be one of rises, falls"),
+        (one_feature('shape = "highest_at"'), r"shape = 'highest_at' needs at"),
+        (one_feature('shape = "rises"\nat = ["1"]'), r"shape = 'rises' has no use for at"),
+        (one_feature('shape = "highest_at"\nat = ["1", "1"]'), r"names '1' twice"),
+        (one_feature('shape = "highest_at"\nat = ["8"]'), r"there is no condition '8'"),
+        (one_feature('shape = "highest_at"\nover = "helix"\nat = [8.5]'), r"there is no helix angle 8.5°"),
+        (one_feature('shape = "span"'), r"shape = 'span' needs value"),
+        (one_feature('shape = "above"\nthan = ["dte_pp_um"]'), r"than must name quantities of one kind"),
+        (one_feature('shape = "alike"\nvalue = 0.8'), r"quantity 'pattern' and shape 'alike' go together"),
+        (one_feature('shape = "rises"\ntolerance = -1'), r"tolerance must be >= 0"),
+        (one_feature('shape = "rises"') + one_feature('shape = "rises"'), r"\[\[feature\]\]: the name .* stands twice"),
+    ],
+    ids=lambda value: value[:60].replace("\n", " ") if value.startswith("[[") else "",
+)  # fmt: skip
+def test_what_is_wrong_is_named(load, more, message):
+    with pytest.raises(FleetError, match=message):
+        load(more)
+
+
+def test_too_many_points_are_refused_with_their_number(load):
+    values = ", ".join(str(number) for number in range(1, 60))
+    with pytest.raises(FleetError, match="has 59 x 59 = 3481 points, allowed are 2000"):
+        load(one_sweep(f'"masuda.constant_db" = [{values}], "operation.torque_n_m" = [{values}]'))
