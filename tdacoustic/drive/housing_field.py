@@ -156,16 +156,12 @@ class HousingField(PointField):
         factors = self._loss_factor, self._cavity_loss_factor
         return with_conditions(held.insertion_loss, states, held.inside, held.mean, self._surface_db, factors)
 
-    def structure_sources(
-        self, forces: BearingForces | None, loss_factor: float | None = None
-    ) -> tuple[StructureSource, ...]:
+    def structure_sources(self, forces: BearingForces | None) -> tuple[StructureSource, ...]:
         """Return the tones of the housing under bearing forces, with ``[model] structure_gain_db``.
 
         Parameters
         ----------
         forces : BearingForces or None
-        loss_factor : float, optional
-            Instead of the fleet's.
         """
         if forces is None:
             return ()
@@ -175,7 +171,7 @@ class HousingField(PointField):
             return ()
         frequencies = forces.frequency_hz[there]
         loads = seat_loads(held.box, forces)[:, :, there]
-        velocities = held.modes.response(frequencies, loads, self._loss_factor if loss_factor is None else loss_factor)
+        velocities = held.modes.response(frequencies, loads, self._loss_factor)
         velocities = velocities * 10.0 ** (0.05 * self._gain_db)
         found = []
         for line, frequency, column in zip(there, frequencies.tolist(), velocities.T, strict=True):

@@ -101,9 +101,7 @@ class PointField:
         self.circle = circle_of(fleet)
         self.adds = paths_of_total(fleet)
 
-    def structure_sources(
-        self, forces: BearingForces | None, loss_factor: float | None = None
-    ) -> tuple[StructureSource, ...]:
+    def structure_sources(self, forces: BearingForces | None) -> tuple[StructureSource, ...]:
         """Return the tones of the housing under bearing forces: none of a field without housing."""
         return ()
 

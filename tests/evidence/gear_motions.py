@@ -45,6 +45,7 @@ FIGURES = ("balance", "integration", "each_other", "bearing_line")
 and to each other. Then of the main line of the bearing forces, balance to converged, over the largest of the six."""
 
 MODULES = ("system", "contact_lines", "harmonic_balance", "floquet", "integration", "kernels", "steady_state")
+MODULES += ("foundation", "mesh_poles")
 
 
 @dataclass(frozen=True)
