@@ -36,6 +36,9 @@ LOWEST_HZ: Final = 20.0
 POINTS_A_WIDTH: Final = 4.0
 """Points of the frequency axis within the width η f of a resonance; steps are no finer than 0.4 % of the frequency."""
 
+_NO_FORCE: Final = 1e-3
+"""Part of a gear's largest bearing force below which a direction has none to speak of."""
+
 WORTH_SAYING_DB: Final = 1.0
 """Change of a level from which a reader of one-way results is told of the other coupling [assumed]."""
 
@@ -91,17 +94,25 @@ class CouplingCurves:
 
     @property
     def difference_db(self) -> Real:
-        """Two-way less one-way bearing force, shape (2, 3, n)."""
+        """Two-way less one-way bearing force, shape (2, 3, n); NaN of a direction that has next to no one-way force."""
         one_way, two_way = self.bearing_force_n_per_um
-        return np.asarray(20.0 * np.log10(two_way / one_way))
+        there = one_way > _NO_FORCE * one_way.max(axis=1, keepdims=True)
+        ratio = np.divide(two_way, one_way, out=np.full_like(one_way, math.nan), where=there)
+        return np.asarray(20.0 * np.log10(ratio))
 
     def differences(self, low_hz: float, high_hz: float) -> tuple[ForceDifference, ...]:
-        """Return how far the bearing forces differ between two frequencies: pinion x, y, z, then wheel x, y, z."""
+        """Return how far the bearing forces differ between two frequencies: pinion x, y, z, then wheel x, y, z.
+
+        Directions without one-way force (along the shafts of spur gears) are left out.
+        """
         held = (self.frequency_hz >= low_hz) & (self.frequency_hz <= high_hz)
-        frequency_hz, found = self.frequency_hz[held], []
+        frequency_hz, difference_db = self.frequency_hz[held], self.difference_db
+        found = []
         for g, gear in enumerate(GEARS):
             for d, direction in enumerate(DIRECTIONS):
-                values = self.difference_db[g, d, held]
+                values = difference_db[g, d, held]
+                if not np.isfinite(values).all():
+                    continue
                 low, high = int(values.argmin()), int(values.argmax())
                 lowest = (float(values[low]), float(frequency_hz[low]))
                 highest = (float(values[high]), float(frequency_hz[high]))
@@ -121,8 +132,8 @@ class CoupledCondition:
     floquet_max : (float or None, float or None)
     structure_db, mesh_db, total_db : (float or None, float or None)
         Levels on the surface; the structure's whether or not the total adds it.
-    in_contact : (bool, bool)
-        Whether teeth stay in contact.
+    in_contact : (bool or None, bool or None)
+        Whether teeth stay in contact; None of teeth that no torque presses, and of a motion that is not known.
 
     Values of the coupling that the fleet does not have are None where the harmonic balance finds no stable motion with
     it.
@@ -135,7 +146,7 @@ class CoupledCondition:
     structure_db: tuple[float | None, float | None]
     mesh_db: tuple[float | None, float | None]
     total_db: tuple[float | None, float | None]
-    in_contact: tuple[bool, bool]
+    in_contact: tuple[bool | None, bool | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,14 +227,15 @@ def coupling_doubts(coupling: Coupling, states: Sequence[GearState]) -> Iterator
     )
     if worst is not None and worst[0] >= WORTH_SAYING_DB:
         yield (
-            f"one-way coupling: with a housing that gives way under the gears the total would be {worst[2]:+.1f} dB in "
-            f'condition {worst[1]}, where it differs most ([model] coupling = "two_way")'
+            "one-way coupling: with a housing that gives way under the gears the total would be "
+            f"{worst[0]:.1f} dB {'higher' if worst[2] > 0.0 else 'lower'} in condition {worst[1]}, where it differs "
+            'most ([model] coupling = "two_way")'
         )
 
 
-def values_of(state: SteadyState | None) -> tuple[float | None, float | None, bool]:
+def values_of(state: SteadyState | None) -> tuple[float | None, float | None, bool | None]:
     """Return peak to peak, largest multiplier and whether teeth stay in contact, of a motion that may not be known."""
     if state is None:
-        return None, None, False
+        return None, None, None
     multiplier = state.floquet_max if math.isfinite(state.floquet_max) else None
-    return state.dte_pp_m, multiplier, not state.separates
+    return state.dte_pp_m, multiplier, None if state.method == "at_rest" else not state.separates

@@ -92,7 +92,8 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
             f'gear_path = "{gear_path}": the bearing forces\' way through the housing takes method = '
             '"boundary_elements", so the total lacks it'
         )
-    if gear_path == "sum" and placement != "off":
+    with_housing = fleet.radiation.method.value != "point_sources"
+    if gear_path == "sum" and placement != "off" and with_housing:
         yield (
             'gear_path = "sum": the gear is counted twice, once by Masuda\'s level of the whole unit and once by the '
             "bearing forces through its housing"

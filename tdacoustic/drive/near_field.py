@@ -256,7 +256,7 @@ class NearField:
         held = next(one for one in self.planes if one.plane.name == name)
         inside = np.zeros(held.plane.place.shape, dtype=bool)
         if loudest is not None:
-            levels, there = held.level_db["total"], held.plane.place == _CODES[place]
+            levels, there = held.level_db[self._path_of(place)], held.plane.place == _CODES[place]
             inside = there & (np.nan_to_num(levels, nan=-math.inf) >= loudest.level_db - AROUND_HIGHEST_DB)
             inside |= there & np.isnan(levels) & np.roll(inside, 1, axis=1)  # a source itself, as its neighbour
         return _border(inside, held.plane.right_m, held.plane.up_m)

@@ -157,6 +157,8 @@ class _Model(DriveModel):
         found = np.empty((len(sources), len(receivers)))
         for row, source in zip(found, sources, strict=True):
             row[:] = source.sound_power_level_db + self._transfer_db(source, receivers)
+            if self.fleet.radiation.air_absorption.value:
+                row -= self.field._absorbed_db(source, receivers)
         return found
 
     def _transfer_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -15,7 +16,8 @@ __all__ = ["coupled_condition_rows", "coupling_rows"]
 
 def coupling_rows(curves: CouplingCurves) -> Iterator[Row]:
     """Yield one row a frequency; bearing forces in dB re 1 N per um of transmission error, teeth in contact."""
-    forces_db = 20.0 * np.log10(curves.bearing_force_n_per_um)
+    forces = curves.bearing_force_n_per_um
+    forces_db = 20.0 * np.log10(np.where(forces > 0.0, forces, math.nan))  # spur gears have none along their shafts
     for number, frequency in enumerate(curves.frequency_hz.tolist()):
         line = curves.lines[number]
         row: Row = {"frequency_hz": frequency}
@@ -26,8 +28,12 @@ def coupling_rows(curves: CouplingCurves) -> Iterator[Row]:
             row[f"mesh_force_{coupling}_n_per_um"] = float(curves.mesh_force_n_per_um[kind, number])
             for g, gear in enumerate(GEARS):
                 for d, direction in enumerate(DIRECTIONS):
-                    row[f"{gear}_{direction}_force_{coupling}_db"] = float(forces_db[kind, g, d, number])
+                    row[f"{gear}_{direction}_force_{coupling}_db"] = _known(forces_db[kind, g, d, number])
         yield row
+
+
+def _known(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
 
 
 def coupled_condition_rows(coupling: Coupling) -> Iterator[Row]:

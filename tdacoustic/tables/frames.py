@@ -37,4 +37,6 @@ def frame_of(name: str, rows: Iterable[Row]) -> pd.DataFrame:
 def _dtype(column: str, values: Sequence[Any]) -> str:
     if column in TEXT_COLUMNS:
         return "str"
-    return "bool" if values and all(isinstance(value, bool) for value in values) else "float64"
+    if any(isinstance(value, bool) for value in values):
+        return "boolean" if any(value is None for value in values) else "bool"
+    return "float64"

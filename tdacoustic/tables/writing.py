@@ -17,5 +17,5 @@ def csv_text(frame: pd.DataFrame) -> str:
     shown = frame.copy()
     for column in shown.columns:
         if pd.api.types.is_bool_dtype(shown[column]):
-            shown[column] = shown[column].map({True: "true", False: "false"})
+            shown[column] = shown[column].map({True: "true", False: "false"}, na_action="ignore")
     return shown.to_csv(index=False, lineterminator="\n", float_format="%.9g", na_rep="")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from tdacoustic.steps import Store
@@ -138,19 +139,23 @@ def _changed(
     for case in fleet.what_if:
         if case.parameters:
             changed = changed_fleet(fleet, case)
-            held = housing
-            if not _same_housing(fleet, changed):
+            held = _of_changed(fleet, changed, housing)
+            if held is None:
                 held, made = housing_sound(changed, store, jobs, progress, receivers)
                 records |= dict(made)
             models[case.name], housings[case.name] = changed_model(fleet, case, held), held
     return models, housings, tuple(records.items())
 
 
-def _same_housing(before: Fleet, after: Fleet) -> bool:
-    """Whether two fleets have the same transfer vectors, or none."""
-    if before.radiation.method.value == "point_sources":
-        return True
-    from tdacoustic.drive.housing_steps import housing_tasks
+def _of_changed(before: Fleet, after: Fleet, housing: HousingSound | None) -> HousingSound | None:
+    """Return the housing of a changed fleet where it needs no new modes, transfer vectors or air inside; else None."""
+    from tdacoustic.drive.gear_unit import gear_unit_of
+    from tdacoustic.drive.housing_box import box_of
+    from tdacoustic.housing import Box
+    from tdacoustic.studies.cases import housing_signature
 
-    first, second = housing_tasks(before), housing_tasks(after)
-    return (first.modes.key, first.mean.key) == (second.modes.key, second.mean.key)
+    if housing is None or housing_signature(before) != housing_signature(after):
+        return None
+    if before.housing != after.housing and isinstance(housing.box, Box):
+        return replace(housing, box=box_of(after, gear_unit_of(after)))  # gears between bearings, loss factor
+    return housing

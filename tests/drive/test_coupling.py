@@ -205,7 +205,7 @@ def test_a_motion_that_the_balance_does_not_find_leaves_its_side_empty(fleet, ho
     assert found.dte_pp_m[0] == states[0].steady.dte_pp_m
     if found.dte_pp_m[1] is None:
         assert found.total_db[1] is None
-        assert found.in_contact[1] is False
+        assert found.in_contact[1] is None
 
 
 def test_a_change_of_the_total_is_told(both):

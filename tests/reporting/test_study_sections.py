@@ -14,6 +14,7 @@ from tdacoustic.reporting.sections.design_sweeps import design_sweeps
 from tdacoustic.reporting.sections.directivity import directivity
 from tdacoustic.reporting.sections.paper_features import features_words, paper_features
 from tdacoustic.reporting.sections.sensitivity import sensitivity
+from tdacoustic.reporting.sections.words import slug
 from tdacoustic.tables import COLUMNS, csv_text
 
 ASKED = """
@@ -177,3 +178,8 @@ def test_a_fleet_that_asks_for_nothing_has_sensitivities_alone(tmp_path):
     assert not {"references", "features", "sweeps", "sweep_points"} & set(found.tables)
     scan = next(record for _, record in found.records if record.step == "responses")
     assert '"scan":false' in scan.settings
+
+
+def test_anchors_of_names_that_differ_in_a_hyphen():
+    assert slug("sweep", "a b") == "sweep-a-b"
+    assert len({slug("sweep", name) for name in ("a b", "a-b", "a.b", "a_b")}) == 4

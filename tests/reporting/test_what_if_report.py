@@ -84,7 +84,7 @@ def test_intervals_in_brackets_and_what_they_hold(answer):
     )
     basis = said(section, "In brackets: intervals of 95 %")
     assert "the range over all values of masuda.constant_db that the data allow (profile likelihood)" in basis
-    assert "the model's scatter of 4 dB as an error of each source by itself in each condition [ours]" in basis
+    assert "the model's scatter of 4 dB as an error of each source by itself in each condition [assumed]" in basis
     assert what_if_line(calibrated).startswith(
         "What if (level at 4 m): at 20 km/h 10 dB less from the motor takes 5.3 dB (0.7 to 9.7) off"
     )

@@ -259,7 +259,7 @@ def _interval_words(answer: WhatIfAnswer) -> str:
     )
     scatter = (
         f", together with the model's scatter of {basis.model_sigma_db:.2g} dB as an error of each source by itself in "
-        "each condition [ours]"
+        "each condition [assumed]"
         if basis.model_sigma_db > 0.0
         else ""
     )

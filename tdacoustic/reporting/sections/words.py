@@ -39,7 +39,7 @@ SAME_LINE = 0.003
 
 
 def slug(*parts: str) -> str:
-    """Return an anchor made of names of any script, unique as long as the names differ.
+    """Return an anchor made of names of any script, unique as long as the names differ in more than case.
 
     Examples
     --------
@@ -47,14 +47,11 @@ def slug(*parts: str) -> str:
     'spectrum-run-1a'
     """
     made = []
-    for part in parts:
+    for number, part in enumerate(parts):
         plain = re.sub(r"[^a-z0-9]+", "-", part.lower()).strip("-")
-        if plain != part:  # keep "1.a" and "1 a" apart
-            plain = (
-                f"{plain}-{sum(ord(c) * 31**i for i, c in enumerate(part)) % 46656:x}"
-                if plain != part.lower().replace(" ", "-")
-                else plain
-            )
+        alike = plain != part.lower().replace(" ", "-") or (number > 0 and "-" in part)  # as others may be
+        if alike:
+            plain = f"{plain}-{sum(ord(c) * 31**i for i, c in enumerate(part)) % 46656:x}"
         made.append(plain or "x")
     return "-".join(made)
 
