@@ -35,7 +35,7 @@ from tdacoustic.housing import Box
 from tdacoustic.radiation import overall_level_db
 from tdacoustic.steps import Task
 
-__all__ = ["QUANTITIES", "Case", "CaseModel", "CaseValues", "conditions_under", "housing_signature"]
+__all__ = ["QUANTITIES", "Case", "CaseModel", "CaseValues", "conditions_under", "housing_signature", "housing_under"]
 
 Real = NDArray[np.float64]
 
@@ -238,9 +238,7 @@ class CaseModel:
         conditions = self._conditions
         if not (same_gears and changed.train == self.fleet.train and changed.operation == self.fleet.operation):
             conditions = conditions_under(self.fleet, changed, conditions)
-        housing = self._housing
-        if housing is not None and changed.housing != self.fleet.housing and isinstance(housing.box, Box):
-            housing = replace(housing, box=box_of(changed, unit))  # places of gears between bearings, loss factor
+        housing = None if self._housing is None else _reseated(self._housing, self.fleet, changed, unit)
         same_air = all(attrgetter(name)(changed) == attrgetter(name)(self.fleet) for name in _OF_POINT_SOURCES)
         model = _Model(changed, unit, housing, self._known, same_air=same_air, integrate=integrate)
         return self._values(model, helix, conditions)
@@ -320,6 +318,27 @@ def housing_signature(fleet: Fleet) -> tuple[str, ...]:
     if fleet.masuda.placement.value == "inside":
         held.append(cavity_task(fleet, gear_unit_of(fleet), tasks.box, tasks.body, tasks.modes))
     return tuple(task.key for task in held if isinstance(task, Task))
+
+
+def housing_under(before: Fleet, after: Fleet, housing: HousingSound | None) -> HousingSound | None:
+    """Return the housing of a changed fleet that needs no modes, transfer vectors or air inside of its own; else None.
+
+    Parameters
+    ----------
+    before, after : Fleet
+    housing : HousingSound or None
+        Of the first.
+    """
+    if housing is None or housing_signature(before) != housing_signature(after):
+        return None
+    return _reseated(housing, before, after, gear_unit_of(after))
+
+
+def _reseated(housing: HousingSound, before: Fleet, after: Fleet, unit: GearUnit) -> HousingSound:
+    """Return a housing with the loss factor and the gears' places between the bearings of a changed fleet."""
+    if after.housing != before.housing and isinstance(housing.box, Box):
+        return replace(housing, box=box_of(after, unit))
+    return housing
 
 
 def _around_db(model: _Model, sources: Sequence[SoundSource]) -> Real:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from tdacoustic.steps import Store
@@ -131,6 +130,7 @@ def _changed(
 ) -> tuple[Mapping[str, DriveModel], Mapping[str, HousingSound | None], Records]:
     """Models and housings of the cases with other parameters, by name, and the records of the housings' steps."""
     from tdacoustic.drive.what_if import changed_fleet, changed_model
+    from tdacoustic.studies.cases import housing_under
     from tdacoustic.workflows.housing_sound import housing_sound
 
     models: dict[str, DriveModel] = {}
@@ -139,23 +139,9 @@ def _changed(
     for case in fleet.what_if:
         if case.parameters:
             changed = changed_fleet(fleet, case)
-            held = _of_changed(fleet, changed, housing)
+            held = housing_under(fleet, changed, housing)
             if held is None:
                 held, made = housing_sound(changed, store, jobs, progress, receivers)
                 records |= dict(made)
             models[case.name], housings[case.name] = changed_model(fleet, case, held), held
     return models, housings, tuple(records.items())
-
-
-def _of_changed(before: Fleet, after: Fleet, housing: HousingSound | None) -> HousingSound | None:
-    """Return the housing of a changed fleet where it needs no new modes, transfer vectors or air inside; else None."""
-    from tdacoustic.drive.gear_unit import gear_unit_of
-    from tdacoustic.drive.housing_box import box_of
-    from tdacoustic.housing import Box
-    from tdacoustic.studies.cases import housing_signature
-
-    if housing is None or housing_signature(before) != housing_signature(after):
-        return None
-    if before.housing != after.housing and isinstance(housing.box, Box):
-        return replace(housing, box=box_of(after, gear_unit_of(after)))  # gears between bearings, loss factor
-    return housing
