@@ -34,8 +34,10 @@ class HousingSeat(Table):
     shaft : str
         ``"pinion"`` or ``"wheel"``.
     position_m : Parameter of (float, float, float) or None
-        In the drive frame: x and z of the shaft, y of its gear.
+        In the drive frame: x and z of the shaft, y of its gear. With a STEP file it may be left out where the file
+        names the seat, and the gear is then in the middle between its bearings.
     radius_m, thickness_mm : Parameter of float or None
+        With a STEP file: of the part of the wall that is a seat where there is no bore; a bore brings its own.
     stiffness_n_per_m : Parameter of (float, float, float)
         Of the springs at each of the two seats along x, y, z; one number stands for all.
     """
@@ -55,7 +57,8 @@ class Housing(Table):
     size_m : Parameter of (float, float, float) or None
         Along the shafts, along travel, up.
     position_m : Parameter of (float, float, float)
-        Of its middle, in the drive frame.
+        Of its middle, in the drive frame; of a STEP file's origin, so that with 0, 0, 0 the coordinates of the drawing
+        are those of the drive.
     wall_mm, bearing_panel_mm, top_bottom_mm : Parameter of float or None
         Thicknesses.
     material : Material
@@ -68,7 +71,13 @@ class Housing(Table):
     hanger_stiffness_n_per_m : Parameter of (float, float, float)
         Along x, y, z; one number stands for all.
     step_file : Parameter of str or None
-        Path, relative to the fleet file.
+        Path, relative to the fleet file, instead of `size_m` and the thicknesses: one closed hollow solid (or up to 20
+        parts that touch), in the unit that the file states, its axes those of the drive (x along travel, y to the left
+        along the shafts, z up). Small gaps are sewn; what is no housing is refused with the reason. Seats are where
+        `position_m` says, else where a face or solid is named so (``"pinion"``, ``"seat wheel left"``; ``"hanger"``
+        names the hanger's place), else on a horizontal line of centres through its middle [assumed]. A round bore along
+        y at a seat is closed by a plug of the housing's material [assumed: bearing and cover]; any other opening into
+        the housing is refused with its place and width.
     seat : tuple of HousingSeat
     """
 

@@ -77,7 +77,8 @@ class Bore:
     @property
     def words(self) -> str:
         """Where it is and how large."""
-        return f"x = {self.centre_m[0]:.4g}, z = {self.centre_m[1]:.4g} m with a radius of {self.radius_m:.3g} m"
+        x, z = (round(place, 6) + 0.0 for place in self.centre_m)
+        return f"x = {x:g}, z = {z:g} m with a radius of {self.radius_m:.3g} m"
 
 
 def bores_of(grid: SurfaceGrid) -> tuple[Bore, ...]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+import shutil
+import tempfile
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,7 +73,10 @@ def imported(path: Path) -> Imported:
     from netgen.occ import OCCException, OCCGeometry, Pnt
 
     try:
-        shape = OCCGeometry(str(path)).shape
+        with tempfile.TemporaryDirectory(prefix="tdacoustic-") as folder:
+            plain = Path(folder, "housing.step")  # Netgen goes by the suffix, in small letters
+            shutil.copyfile(path, plain)
+            shape = OCCGeometry(str(plain)).shape
     except (NgException, OCCException, RuntimeError) as error:
         raise HousingError(f"OpenCASCADE cannot read it: {' '.join(str(error).split())}; export it anew") from None
     if shape is None or not shape.faces:

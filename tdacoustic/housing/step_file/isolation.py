@@ -69,7 +69,10 @@ def run_apart(function: str, arguments: tuple[Any, ...], what: str, most_s: floa
                     raise HousingError(f"{what} took more than {most_s:.0f} s and was ended") from None
                 raise
         if not found.exists():
-            raise HousingError(f"{what} ended OpenCASCADE (exit status {code}): the geometry in it is damaged")
+            raise HousingError(
+                f"OpenCASCADE, Netgen or NGSolve crashed while {what} (exit status {code}): its geometry is damaged, "
+                "or there is too little memory"
+            )
         result, refused = pickle.loads(found.read_bytes())
     if refused is not None:
         raise refused

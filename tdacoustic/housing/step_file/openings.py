@@ -19,7 +19,7 @@ __all__ = ["Opening", "openings_of", "samples"]
 Real = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_CELLS: Final = 60
+_CELLS: Final = 48
 """Of the lattice along the longest dimension."""
 
 _LEAST: Final = 0.6
@@ -134,7 +134,7 @@ def _deepest(hollow: Hollow) -> tuple[int, ...] | None:
     """Return the cell of the hollow with most room around it; None of a body that is not hollow."""
     best: tuple[float, tuple[int, ...]] | None = None
     least = max(8.0, _HOLLOW * hollow.clearance_m.size)
-    for radius in np.linspace(_LEAST * hollow.cell_m, 0.5 * _CELLS * hollow.cell_m, 40):
+    for radius in np.linspace(_LEAST * hollow.cell_m, 0.5 * _CELLS * hollow.cell_m, 20):
         parts = hollow.reached(float(radius))
         sizes = np.bincount(parts.ravel()).astype(float)
         sizes[[0, parts[0, 0, 0]]] = 0.0

@@ -148,7 +148,7 @@ def _on_bore(shaft: str, centre: tuple[float, float], bores: Sequence[Bore]) -> 
     near = [bore for bore in bores if math.dist(bore.centre_m, centre) <= _ON_AXIS_M]
     if near:
         x, z = near[0].centre_m
-        return round(x, 7), round(z, 7)
+        return round(x, 7) + 0.0, round(z, 7) + 0.0
     around = [bore for bore in bores if math.dist(bore.centre_m, centre) < bore.radius_m]
     if around:
         raise HousingError(

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.housing.box import HousingError
+from tdacoustic.housing.step_file.bores import bores_of
 from tdacoustic.housing.step_file.importing import imported
 from tdacoustic.housing.step_file.isolation import run_apart
 from tdacoustic.housing.step_file.openings import openings_of
@@ -93,6 +94,8 @@ def surveyed(path: Path, wish: SolidWish) -> Surveyed:
             "lettering, small holes and roundings)"
         )
     check_sound(grid, found.solid.mass)
+    if not bores_of(grid):  # nothing will be closed
+        _check_closed(grid, grid.only(outer_part(grid)))
     seating = seated(found, grid, wish)
     whole = surface_grid(seating.whole, edge_m)
     at_air = whole.only(~whole.between)
