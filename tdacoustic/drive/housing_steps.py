@@ -145,7 +145,7 @@ def _points(settings: PointSettings, **bands: TransferNodes | NearNodes) -> Poin
     return point_vectors(settings.body, far, settings.points_m, near)
 
 
-HOUSING_MODES: Final = Step("housing-modes", 1, _modes, "Modes of the housing by finite elements")
+HOUSING_MODES: Final = Step("housing-modes", 2, _modes, "Modes of the housing by finite elements")
 TRANSFER_VECTORS: Final = Step(
     "transfer-vectors", 1, _transfer, "Sound of the housing's modes and of point sources by boundary elements"
 )

@@ -20,7 +20,7 @@ __all__ = ["MODES_BEYOND", "box_structure", "edge_for", "expected_modes", "housi
 MODES_BEYOND: Final = 1.2
 """Natural modes are computed up to this times the highest frequency; the static correction stands for the rest."""
 
-_EDGES_A_WAVE: Final = 1.6
+_EDGES_A_WAVE: Final = 2.0
 """Edges of the grid a bending wave of the thinnest panel, at the highest natural mode; order 4."""
 
 

@@ -23,7 +23,7 @@ TETRAHEDRA = ((0.15, 0.03, 3, 1030.0, 60), (0.15, 0.03, 4, 1030.0, 60), (0.15, 0
 GRIDS = ((2.0, 4), (1.4, 4), (1.0, 4), (0.7, 4), (1.0, 3), (1.4, 5))
 """Edges over those that `edge_for` gives, and order."""
 
-FINEST = (0.7, 5, 3, 4)
+FINEST = (0.7, 5, 3, 5)
 """The same of the grid they are held against, and its orders through walls and joints."""
 
 RESPONSE_HZ = (150.0, 475.0, 700.0, 1000.0, 1250.0, 1500.0)

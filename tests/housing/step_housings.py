@@ -101,8 +101,8 @@ def write(shape, path, unit="millimetre"):
 
     per_metre = {"millimetre": MM, "metre": 1.0, "inch": MM / 25.4}[unit]
     shape.Scale(Pnt(0.0, 0.0, 0.0), per_metre).WriteStep(str(path))
-    if unit != "millimetre":
-        path.write_text(in_unit(path.read_text(encoding="ascii"), unit), encoding="ascii")
+    text = re.sub(r"'\d{4}-\d\d-\d\dT[\d:]+'", "'2000-01-01T00:00:00'", path.read_text(encoding="ascii"), count=1)
+    path.write_text(text if unit == "millimetre" else in_unit(text, unit), encoding="ascii")  # alike whenever written
     return path
 
 
