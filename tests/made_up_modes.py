@@ -48,7 +48,7 @@ thickness_mm = 30
 def fleet_text(motor, highest_hz):
     """The reference drive with boundary elements, this small housing and another motor."""
     whole = plain_fleet("reference-drive").read_text(encoding="utf-8")
-    start, end = whole.index("# Section 5 names radii"), whole.index("[radiation]")
+    start, end = whole.index("# Radii usual for machines"), whole.index("[radiation]")
     text = (whole[:start] + motor + HOUSING + whole[end:]).replace("= 3000", f"= {highest_hz}")
     return text.replace("point_sources", "boundary_elements")
 

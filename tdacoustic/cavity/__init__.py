@@ -7,14 +7,13 @@ SI units, the frame of the housing's middle, time factor exp(+jωt). Walls answe
 from tdacoustic.cavity.box import (
     CLEARANCE_M,
     BoxInterior,
-    box_cavity,
     box_interior,
     check_inside,
     inner_size_m,
     interior_of,
     wall_displacements,
-    with_source_at,
 )
+from tdacoustic.cavity.box_modes import box_cavity, with_source_at
 from tdacoustic.cavity.coupling import WallModes, blocked_forces, coupled_velocities, wall_impedance
 from tdacoustic.cavity.losses import boundary_layer_loss_factor
 from tdacoustic.cavity.mass_law import field_incidence_db

@@ -65,7 +65,7 @@ def conditions_of(fleet: Fleet) -> tuple[Condition, ...]:
 def followed(condition: Condition, before: Fleet, after: Fleet) -> Condition:
     """Return a condition with the speed and torque that a changed fleet gives it, where the fleet gave them before.
 
-    The train's speed stays; what runs state of torque or turns stays too.
+    The train's speed stays; what runs state of torque or turns stays too. With the torque goes the mode.
 
     Parameters
     ----------
@@ -76,11 +76,14 @@ def followed(condition: Condition, before: Fleet, after: Fleet) -> Condition:
     motor_hz, torque_n_m = condition.motor_hz, condition.torque_n_m
     if math.isclose(Kinematics.of(before).motor_hz_at_km_h(speed), motor_hz, rel_tol=1e-9):
         motor_hz = Kinematics.of(after).motor_hz_at_km_h(speed)
+    mode = condition.mode
     try:
         of_law = math.isclose(torque_at(before, speed), torque_n_m, rel_tol=1e-9)
     except FleetError:  # there is no law: the runs state their torques
         of_law = False
-    return replace(condition, motor_hz=motor_hz, torque_n_m=torque_at(after, speed) if of_law else torque_n_m)
+    if of_law and mode == before.operation.mode.value:
+        torque_n_m, mode = torque_at(after, speed), after.operation.mode.value
+    return replace(condition, motor_hz=motor_hz, torque_n_m=torque_n_m, mode=mode)
 
 
 def torque_at(fleet: Fleet, train_speed_km_h: float) -> float:

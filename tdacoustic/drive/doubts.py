@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
+from typing import Final
 
 from tdacoustic.drive.gear_unit import GearUnit
-from tdacoustic.drive.prediction import DriveSound, GearState, HelixCase
+from tdacoustic.drive.patterns import pattern_of
+from tdacoustic.drive.prediction import Directivity, DriveSound, GearState, HelixCase
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
 from tdacoustic.radiation import ABSORPTION_RANGE
 
-__all__ = ["gear_doubts", "sound_doubts"]
+__all__ = ["circle_doubts", "gear_doubts", "sound_doubts"]
+
+NODE_PLANE_DB: Final = 6.0
+"""From which the circle's mean below the sphere's counts as a node plane [assumed]."""
 
 
 def gear_doubts(
@@ -102,7 +108,7 @@ def sound_doubts(fleet: Fleet, sound: tuple[DriveSound, ...], unknown: tuple[str
         yield _inside_doubt(fleet)
     if placement == "off":
         yield "Masuda's meshing noise is off: it is shown, and the total holds nothing of it"
-    yield from _air_doubts(fleet)
+    yield from _air_doubts(fleet, sound)
     if unknown:
         yield (
             f"excitation{'s' if len(unknown) > 1 else ''} {', '.join(unknown)} of the motor: neither flux "
@@ -124,10 +130,52 @@ def _inside_doubt(fleet: Fleet) -> str:
     )
 
 
-def _air_doubts(fleet: Fleet) -> Iterator[str]:
+def circle_doubts(fleet: Fleet, sounds: Sequence[DriveSound], arounds: Sequence[Directivity]) -> Iterator[str]:
+    """Yield where the circle of the directivity lies in a node plane of the sound.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    sounds : sequence of DriveSound
+        Of the conditions, then of the helix angles.
+    arounds : sequence of Directivity
+        Of the same.
+    """
+    sphere_m, circle_m = fleet.radiation.sphere_radius_m.value, fleet.radiation.circle_radius_m.value
+    below: dict[str, list[str]] = {"speed": [], "helix": []}
+    for sound, around in zip(sounds, arounds, strict=True):
+        on_sphere = sound.level_db(f"{sphere_m:g} m")
+        if on_sphere is None:
+            continue
+        # 1/R from the one sphere to the other; what the air takes on the way between is left out
+        apart = on_sphere + 20.0 * math.log10(sphere_m / circle_m) - pattern_of(around).mean_db
+        if apart > NODE_PLANE_DB:
+            name = sound.condition if around.sweep == "speed" else f"{around.value:g}°"
+            below[around.sweep].append(f"{name} ({apart:.0f} dB)")
+    if not any(below.values()):
+        return
+    named = [(("condition", "conditions"), below["speed"]), (("helix angle", "helix angles"), below["helix"])]
+    where = "; ".join(f"{words[len(held) > 1]} {', '.join(held)}" for words, held in named if held)
+    yield (
+        f"{where}: the mean level on the circle at {circle_m:g} m lies so far below the mean over the sphere of that "
+        "radius, because the circle lies in a node plane of the sound. What is left there is the small difference of "
+        "large parts: its level and shape hang on the symmetry of the model and on the grid (some dB), and say nothing "
+        "of how loud the drive is"
+    )
+
+
+def _air_doubts(fleet: Fleet, sound: Sequence[DriveSound]) -> Iterator[str]:
     radiation = fleet.radiation
-    (coldest, hottest), (driest, _), _ = ABSORPTION_RANGE
+    (coldest, hottest), (driest, _), (lowest_hz, highest_hz) = ABSORPTION_RANGE
     air = (radiation.temperature_degc.value, radiation.humidity_percent.value)
+    if radiation.air_absorption.value:
+        heard = (source.frequency_hz for one in sound for source in one.sources)
+        beyond = [frequency for frequency in heard if not lowest_hz <= frequency <= highest_hz]
+        if beyond:
+            yield (
+                f"absorption of the air at {min(beyond):.0f} to {max(beyond):.0f} Hz is extrapolated: ISO 9613-1 "
+                f"states it for {lowest_hz:g} to {highest_hz:g} Hz"
+            )
     if radiation.air_absorption.value and not (coldest <= air[0] <= hottest and air[1] >= driest):
         yield (
             f"absorption of the air at {air[0]:g} °C and {air[1]:g} % humidity is extrapolated: ISO 9613-1 states it "

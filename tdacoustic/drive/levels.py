@@ -159,11 +159,22 @@ class PointField:
         for row, source in zip(at, sources, strict=True):
             row[:] = source.sound_power_level_db + self.transfer_db(source, receivers)
             if self._absorbing:
-                row -= self._absorbed_db(source, receivers)
+                row -= self.absorbed_db(source, receivers)
         return at
 
-    def _absorbed_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
-        """Return what the air takes on the straight way from a source to receivers; reflections go as far."""
+    def absorbed_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
+        """Return what the air takes on the straight way from a source to receivers; reflections go as far.
+
+        Parameters
+        ----------
+        source : SoundSource
+        receivers : sequence of Receiver
+
+        Returns
+        -------
+        ndarray, shape (receivers,)
+            In dB.
+        """
         ways = [r.distance_m if r.position_m is None else math.dist(r.position_m, source.position_m) for r in receivers]
         return np.array(ways) * float(absorption_db_per_m(source.frequency_hz, *self._air))
 
@@ -176,7 +187,8 @@ class PointField:
         held = [source for source in sources if source.path in self.adds]
         if not held:
             return np.full(len(self.circle), math.nan)
-        return 10.0 * np.log10(np.sum(10.0 ** (0.1 * self._received_db(held, self.circle)), axis=0))
+        with np.errstate(divide="ignore"):  # silent: minus infinity
+            return np.asarray(10.0 * np.log10(np.sum(10.0 ** (0.1 * self._received_db(held, self.circle)), axis=0)))
 
 
 def _weights_db(sources: Sequence[SoundSource], weighting: Weighting) -> Real:

@@ -12,7 +12,7 @@ import numpy as np
 
 from tdacoustic.drive.conditions import Condition, conditions_of
 from tdacoustic.drive.coupling import CoupledCondition, Coupling, coupling_curves, coupling_doubts, values_of
-from tdacoustic.drive.doubts import gear_doubts, sound_doubts
+from tdacoustic.drive.doubts import circle_doubts, gear_doubts, sound_doubts
 from tdacoustic.drive.gear_unit import GearUnit, gear_unit_of
 from tdacoustic.drive.housing_field import HousingField, HousingSound
 from tdacoustic.drive.levels import CIRCLE_DEG, PointField, Receiver
@@ -141,6 +141,7 @@ class DriveModel:
             *gear_doubts(self.fleet, self.unit, states, helix),
             *sound_doubts(self.fleet, sound, self._motor.without_amplitude),
             *self.field.doubts([source for one in sound for source in one.sources]),
+            *circle_doubts(self.fleet, [*sound, *(case.sound for case in helix)], around),
         )
         return Prediction(
             self.unit,

@@ -282,7 +282,8 @@ _CODES: Final[dict[Place, int]] = {"outside": OUTSIDE, "inside": INSIDE}
 def pattern_correlation(fields: Sequence[NearField]) -> Real:
     """Return Pearson's correlation of the levels in dB outside the housing, pair by pair, shape (fields, fields).
 
-    Points that count in all of the maps are compared. NaN of fields without sound.
+    Points that count in all of the maps that sound are compared. NaN of maps without sound, or with the same level
+    everywhere, with any other.
 
     Parameters
     ----------
@@ -290,10 +291,15 @@ def pattern_correlation(fields: Sequence[NearField]) -> Real:
         On the same planes.
     """
     patterns = np.stack([field.pattern() for field in fields])
-    common = np.isfinite(patterns).all(axis=0)
-    if np.count_nonzero(common) < 2:
-        return np.full((len(fields), len(fields)), math.nan)
-    return np.atleast_2d(np.corrcoef(patterns[:, common]))
+    found = np.full((len(fields), len(fields)), math.nan)
+    heard = np.flatnonzero(np.isfinite(patterns).any(axis=1))
+    patterns = patterns[heard]
+    patterns = patterns[:, np.isfinite(patterns).all(axis=0)]
+    if patterns.shape[1] < 2:
+        return found
+    shaped = np.ptp(patterns, axis=1) > 0.0
+    found[np.ix_(heard[shaped], heard[shaped])] = np.corrcoef(patterns[shaped])
+    return found
 
 
 def _border(inside: NDArray[np.bool_], right_m: Real, up_m: Real) -> tuple[Real, Real]:

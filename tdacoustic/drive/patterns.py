@@ -78,8 +78,8 @@ class PatternPair:
 
 
 def range_db(level_db: Real) -> float:
-    """Return the difference of the loudest and the quietest direction; NaN of no sound."""
-    return float(np.ptp(level_db))
+    """Return the difference of the loudest and the quietest direction; NaN where one of them has no sound."""
+    return float(np.ptp(level_db)) if np.isfinite(level_db).all() else math.nan
 
 
 def pattern_of(around: Directivity) -> Pattern:
@@ -127,12 +127,12 @@ def least_alike(levels_db: Real) -> float:
     Parameters
     ----------
     levels_db : ndarray, shape (patterns, directions)
-        Patterns without sound, and those that range over less than `SHAPED_DB`, are left out.
+        Patterns with a direction without sound, and those that range over less than `SHAPED_DB`, are left out.
 
     Returns
     -------
     float
         NaN of fewer than two.
     """
-    shaped = levels_db[np.ptp(levels_db, axis=1) >= SHAPED_DB]
+    shaped = [levels for levels in levels_db if range_db(levels) >= SHAPED_DB]
     return float(np.corrcoef(shaped).min()) if len(shaped) > 1 else math.nan

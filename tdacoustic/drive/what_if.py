@@ -28,6 +28,7 @@ __all__ = [
     "changed_model",
     "changed_total_db",
     "check_cases",
+    "most_off_db",
     "off_name",
     "step_name",
     "what_if_answer",
@@ -122,6 +123,9 @@ class WhatIfAnswer:
     basis : IntervalBasis or None
         None without intervals.
     doubts : tuple of str
+    line_fractions : tuple of (str, float)
+        Conditions with recordings, and the part of the recorded sound energy that lines carry: the model has lines
+        alone.
     """
 
     surface: str
@@ -131,6 +135,7 @@ class WhatIfAnswer:
     levels: tuple[WhatIfLevel, ...]
     basis: IntervalBasis | None = None
     doubts: tuple[str, ...] = ()
+    line_fractions: tuple[tuple[str, float], ...] = ()
 
     def level(self, condition: str, case: str, receiver: str, weighting: str = "Z") -> WhatIfLevel | None:
         """Return one of the levels; None of a case that is not for this condition."""
@@ -154,6 +159,22 @@ def step_name(path: str, step_db: float) -> str:
 def off_name(path: str) -> str:
     """Return the name of the case without a path."""
     return f"{path} off"
+
+
+def most_off_db(line_fraction: float) -> float:
+    """Return what a recorded level loses at most by quieter lines, all else staying as it is, in dB.
+
+    Parameters
+    ----------
+    line_fraction : float
+        Part of the sound energy that lines carry, 0 to 1.
+
+    Examples
+    --------
+    >>> round(most_off_db(0.16), 2)
+    0.76
+    """
+    return math.inf if line_fraction >= 1.0 else -10.0 * math.log10(1.0 - max(line_fraction, 0.0))
 
 
 def cases_of(fleet: Fleet, sounds: Iterable[DriveSound]) -> tuple[tuple[WhatIf, ...], tuple[Path, ...]]:
@@ -264,7 +285,7 @@ def what_if_answer(
     """
     fleet = model.fleet
     cases, paths = cases_of(fleet, sounds)
-    check_cases(fleet, conditions)
+    check_cases(fleet, [condition.name for condition in conditions])
     models = {
         case.name: (changed or {}).get(case.name) or changed_model(fleet, case) for case in cases if case.parameters
     }
@@ -312,27 +333,29 @@ def _total_db(
     return total if math.isfinite(total) else None
 
 
-def check_cases(fleet: Fleet, conditions: Sequence[Condition]) -> None:
-    """Raise for a name in ``[[what_if]] conditions`` that is no condition.
+def check_cases(fleet: Fleet, conditions: Iterable[str]) -> None:
+    """Raise for names in ``[[what_if]] conditions`` that are no conditions.
 
     Parameters
     ----------
     fleet : Fleet
-    conditions : sequence of Condition
-        Those that are computed. A condition of ``[operation]`` that is not among them is no fault.
+    conditions : iterable of str
+        Names of those that are computed. A condition of ``[operation]`` that is not among them is no fault.
 
     Raises
     ------
     FleetError
     """
-    names = tuple(dict.fromkeys((*(condition.name for condition in conditions), *fleet.operation.names)))
+    names = tuple(dict.fromkeys((*conditions, *fleet.operation.names)))
     for case in fleet.what_if:
-        for name in case.conditions or ():
-            if name not in names:
-                raise FleetError(
-                    f"{fleet.path}: [[what_if]] {case.name!r}: conditions names {name!r}, which is no condition; there "
-                    f"are {', '.join(names)}"
-                )
+        foreign = [name for name in case.conditions or () if name not in names]
+        if foreign:
+            named = ", ".join(repr(name) for name in foreign)
+            verb = "which is no condition" if len(foreign) == 1 else "which are no conditions"
+            raise FleetError(
+                f"{fleet.path}: [[what_if]] {case.name!r}: conditions names {named}, {verb}; there are "
+                f"{', '.join(names) or 'none'}"
+            )
 
 
 def _without_effect(fleet: Fleet, cases: Sequence[WhatIf], paths: Sequence[Path]) -> Iterator[str]:

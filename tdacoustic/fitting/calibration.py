@@ -24,10 +24,10 @@ from tdacoustic.fitting.doubts import (
     doubts_of_values,
     is_blind,
 )
-from tdacoustic.fitting.free import free_parameter
+from tdacoustic.fitting.free import checked_free, free_parameter
 from tdacoustic.fitting.intervals import ProfileInterval, profile_intervals
 from tdacoustic.fitting.least_squares import fit
-from tdacoustic.fitting.levels import OF_TRANSFER, OUTSIDE_TRANSFER, SILENCE_DB, LevelModel
+from tdacoustic.fitting.levels import SILENCE_DB, LevelModel
 from tdacoustic.fitting.loss import Objective
 from tdacoustic.fitting.measured_level import LEVELS_OF_CALIBRATION, OFFSET, MeasuredLevel, fingerprint
 from tdacoustic.fitting.next_measurement import Candidate, next_measurements
@@ -95,7 +95,7 @@ def calibrate_fleet(
         level for any of them, or it cannot be computed where the fit starts.
     """
     settings = settings or FitSettings()
-    _check_transfer(fleet, free)
+    checked_free(fleet, [parameter.name for parameter in free])
     held, said = _heard(fleet, data, housing)
     if model is None or len(held) != len(data):
         model = LevelModel(fleet, held, housing)
@@ -146,18 +146,6 @@ def calibrate_fleet(
         ),
         found,
     )
-
-
-def _check_transfer(fleet: Fleet, free: Sequence[FreeParameter]) -> None:
-    """Raise for parameters whose every value would ask for transfer vectors of its own."""
-    if fleet.radiation.method.value == "point_sources":
-        return
-    for parameter in free:
-        if parameter.name.startswith(OF_TRANSFER) and parameter.name not in OUTSIDE_TRANSFER:
-            raise FittingError(
-                f"{parameter.name} cannot be free: the transfer vectors of the housing depend on it; of the housing "
-                f"{', '.join(OUTSIDE_TRANSFER)} and model.structure_gain_db can"
-            )
 
 
 def _check_start(model: LevelModel, free: Sequence[FreeParameter]) -> None:

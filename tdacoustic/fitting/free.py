@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import keyword
 import math
+from collections.abc import Sequence
 from typing import Final, Literal
 
 from tdacoustic.errors import FittingError, FleetError
 from tdacoustic.fitting.parameters import FreeParameter
 from tdacoustic.fleet import Fleet
 
-__all__ = ["free_parameter"]
+__all__ = ["checked_free", "free_parameter"]
 
 Scale = Literal["linear", "log"]
 
@@ -128,3 +129,38 @@ def _allowed(fleet: Fleet, key: str, value: float, end: float) -> float:
                 break
         end = 0.5 * (inside + outside)
     return inside
+
+
+def checked_free(fleet: Fleet, names: Sequence[str]) -> None:
+    """Raise for parameters whose every value would ask for modes or transfer vectors of its own.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    names : sequence of str
+        Of parameters that a calibration is to move; those that are none of the fleet's are not looked at.
+
+    Raises
+    ------
+    FittingError
+    """
+    if fleet.radiation.method.value == "point_sources":
+        return
+    from tdacoustic.drive.housing_steps import housing_tasks
+    from tdacoustic.drive.insertion_loss import air_tasks
+
+    def keys(of: Fleet) -> tuple[str, ...]:
+        tasks = housing_tasks(of)
+        inside = air_tasks(of, tasks)[:1] if of.masuda.placement.value == "inside" else ()
+        return tuple(task.key for task in (tasks.modes, tasks.mean, *inside))
+
+    before = keys(fleet)
+    for name in names:
+        if "." not in name or "[" in name:
+            continue
+        value = fleet.value_of(name)
+        if keys(fleet.replaced({name: 0.9999 * value if value else 1e-3})) != before:
+            raise FittingError(
+                f"{name} cannot be free with boundary elements: the housing's modes or transfer vectors depend on it, "
+                "and each value of it would take minutes"
+            )

@@ -29,7 +29,7 @@ from tdacoustic.fleet import Fleet
 from tdacoustic.gears import BearingForces, bearing_forces
 from tdacoustic.radiation import overall_level_db
 
-__all__ = ["OF_TRANSFER", "OUTSIDE_TRANSFER", "SILENCE_DB", "LevelModel"]
+__all__ = ["SILENCE_DB", "LevelModel"]
 
 Real = NDArray[np.float64]
 
@@ -51,10 +51,6 @@ GAINS: Final[Mapping[str, Path]] = {
     "model.motor_gain_db": "motor",
 }
 """Parameters that add to the level of a path as they stand: nothing is computed anew for them."""
-
-OF_TRANSFER: Final = ("housing.", "radiation.", "masuda.position_m", "motor.position_m")
-OUTSIDE_TRANSFER: Final = ("housing.cavity_loss_factor", "housing.loss_factor")
-"""Parameters that transfer vectors depend on, minutes of work for each value, and those among them that are none."""
 
 SILENCE_DB: Final = -200.0
 

@@ -7,13 +7,16 @@ shapes of another source beside the model's.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, model_validator
 
+from tdacoustic.fleet.keys import flat_keys
 from tdacoustic.toml_models import Name, Table, Text, each_once, shown
 
 __all__ = [
+    "FLAT_DB",
     "MOST_POINTS",
     "NEEDS_AT",
     "NEEDS_VALUE",
@@ -70,24 +73,35 @@ Shape = Literal[
 NEEDS_AT: Final = ("highest_at", "lowest_at")
 NEEDS_VALUE: Final = ("span", "toward", "alike")
 _TOLERANCE: Final = {"toward": 22.5, "alike": 0.0, "above": 0.0, "highest_at": 0.0, "lowest_at": 0.0, "span": 2.0}
-"""Usual tolerances [assumed], degrees of a direction and dB of a span; of the other shapes `_FLAT_DB`."""
-_FLAT_DB: Final = 0.5
+"""Usual tolerances [assumed], degrees of a direction and dB of a span; of the other shapes `FLAT_DB`."""
+FLAT_DB: Final = 0.5
 """Within which values count as level [assumed]."""
 _NEAR_DB: Final = 1.0
 """Within which two numbers count as the same [assumed]."""
+_AS: Final = '{ "masuda.constant_db" = [20, 30] }'
 
 
 def _assignments(value: Any) -> tuple[tuple[str, tuple[Any, ...]], ...]:
-    pairs = tuple(value.items()) if isinstance(value, dict) else value if isinstance(value, tuple) else ()
-    if not pairs or not all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs):
-        raise ValueError(f'must be a table of lists, as {{ "masuda.constant_db" = [20, 30] }}, got {shown(value)}')
+    pairs = flat_keys(value) if isinstance(value, Mapping) else value if isinstance(value, tuple) else None
+    if pairs is None or not all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs):
+        raise ValueError(f"must be a table of lists, as {_AS}, got {shown(value)}")
+    if not pairs:
+        raise ValueError(f"must name a key with a list of values, as {_AS}, got an empty table")
     for key, values in pairs:
         if not isinstance(values, tuple) or not values:
             raise ValueError(f"must have a list of values for {key!r}, got {shown(values)}")
         for number, one in enumerate(values):
-            if one in values[:number]:
+            if not _is_finite(one):
+                raise ValueError(f"must have finite values for {key!r}, got {shown(one)}")
+            if any(one == other and isinstance(one, bool) == isinstance(other, bool) for other in values[:number]):
                 raise ValueError(f"names {shown(one)} twice for {key!r}")
     return pairs
+
+
+def _is_finite(value: Any) -> bool:
+    if isinstance(value, tuple):
+        return all(_is_finite(entry) for entry in value)
+    return not isinstance(value, float) or math.isfinite(value)
 
 
 def _names(value: Any) -> Any:
@@ -123,7 +137,7 @@ class DesignSweep(Table):
 
     name: Name
     parameters: Annotated[tuple[tuple[str, tuple[Any, ...]], ...], PlainValidator(_assignments)]
-    conditions: tuple[Name, ...] = ()
+    conditions: Annotated[tuple[Name, ...], AfterValidator(each_once)] = ()
 
     @property
     def n_points(self) -> int:
@@ -210,7 +224,7 @@ class Feature(Table):
     over: Over = "conditions"
     shape: Shape
     at: Places = ()
-    than: tuple[Quantity, ...] = ()
+    than: Annotated[tuple[Quantity, ...], AfterValidator(each_once)] = ()
     value: float | None = None
     tolerance: Annotated[float, Field(ge=0.0)] | None = None
     origin: Text
@@ -218,7 +232,7 @@ class Feature(Table):
     @property
     def tolerated(self) -> float:
         """The tolerance, where the file gives none the usual one: 0.5 dB of a shape, 2 dB of a span, 22.5°."""
-        return _TOLERANCE.get(self.shape, _FLAT_DB) if self.tolerance is None else self.tolerance
+        return _TOLERANCE.get(self.shape, FLAT_DB) if self.tolerance is None else self.tolerance
 
     @property
     def label(self) -> str:
@@ -229,11 +243,14 @@ class Feature(Table):
     @model_validator(mode="after")
     def _consistent(self) -> Feature:
         needs = {"at": NEEDS_AT, "value": NEEDS_VALUE, "than": ("above",)}
-        for key, shapes in needs.items():
-            given = getattr(self, key) not in ((), None)
-            if given != (self.shape in shapes):
-                verb = "needs" if not given else "has no use for"
-                raise ValueError(f"shape = {self.shape!r} {verb} {key}")
+        given = {key for key in needs if getattr(self, key) not in ((), None)}
+        wanted = {key for key, shapes in needs.items() if self.shape in shapes}
+        wrong = {"needs": wanted - given, "has no use for": given - wanted}
+        told = [f"{verb} {' and '.join(key for key in needs if key in keys)}" for verb, keys in wrong.items() if keys]
+        if told:
+            raise ValueError(f"shape = {self.shape!r} {' and '.join(told)}")
+        if self.shape == "span" and self.value is not None and self.value <= 0.0:
+            raise ValueError(f"value must be > 0 for shape = 'span', got {self.value:g}")
         if (self.quantity == "pattern") != (self.shape == "alike"):
             raise ValueError("quantity 'pattern' and shape 'alike' go together")
         if (self.quantity == "loudest_deg") != (self.shape == "toward"):

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final
 
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet.entries import split_entry
 from tdacoustic.fleet.messages import key_problem
-from tdacoustic.toml_models import nearest
+from tdacoustic.toml_models import nearest, shown
 
 if TYPE_CHECKING:
     from tdacoustic.fleet.fleet import Fleet
+    from tdacoustic.fleet.studies import Feature
 
-__all__ = ["study_problems"]
+__all__ = ["check_studies", "study_problems"]
+
+_KINDS: Final = {"numbers": "numbers", "words": "words", "truth": "true or false", "mixed": "values of one kind"}
 
 
 def study_problems(fleet: Fleet) -> Iterator[str]:
@@ -34,19 +37,48 @@ def study_problems(fleet: Fleet) -> Iterator[str]:
             yield f"[[{kind}]]: the name {twice!r} stands twice"
     for sweep in fleet.sweep:
         where = f"[[sweep]] {sweep.name!r}"
-        for key, _ in sweep.parameters:
+        for key, values in sweep.parameters:
             problem = _key_problem(fleet, key)
-            if problem is not None:
-                yield f"{where}: {problem}"
+            wrong = [*_value_problems(fleet, key, values)] if problem is None else [problem]
+            yield from (f"{where}: {one}" for one in wrong)
         yield from (f"{where}: {problem}" for problem in _foreign(fleet, sweep.conditions))
     for number, reference in enumerate(fleet.reference, 1):
         where = f"[[reference]] {number}"
+        if reference in fleet.reference[: number - 1]:
+            yield f"{where}: says the same as [[reference]] {fleet.reference.index(reference) + 1}"
         yield from (f"{where}: {problem}" for problem in _foreign(fleet, reference.condition or ()))
         if reference.helix_angle_deg is not None:
             yield from (f"{where}: {p}" for p in _foreign_angles(fleet, (f"{reference.helix_angle_deg:g}",)))
     for feature in fleet.feature:
         of = _foreign if feature.over == "conditions" else _foreign_angles
-        yield from (f"[[feature]] {feature.label!r}: {problem}" for problem in of(fleet, feature.at))
+        problems = [*of(fleet, feature.at), *_all_named(fleet, feature)]
+        yield from (f"[[feature]] {feature.label!r}: {problem}" for problem in problems)
+
+
+def check_studies(fleet: Fleet, conditions: Iterable[str]) -> None:
+    """Raise for conditions of ``[[sweep]]``, ``[[reference]]`` and ``[[feature]]`` that there are not.
+
+    For a fleet whose ``[operation]`` has none, so that a campaign names them; others are checked when they are read.
+
+    Parameters
+    ----------
+    fleet : Fleet
+    conditions : iterable of str
+        Names of those that are computed.
+
+    Raises
+    ------
+    FleetError
+    """
+    if fleet.operation.names:
+        return
+    known = tuple(conditions)
+    asked = [(f"[[sweep]] {one.name!r}", one.conditions) for one in fleet.sweep]
+    asked += [(f"[[reference]] {number}", one.condition or ()) for number, one in enumerate(fleet.reference, 1)]
+    asked += [(f"[[feature]] {one.label!r}", one.at) for one in fleet.feature if one.over == "conditions"]
+    for where, names in asked:
+        for problem in _foreign_names(names, known):
+            raise FleetError(f"{fleet.path}: {where}: {problem}")
 
 
 def _key_problem(fleet: Fleet, key: str) -> str | None:
@@ -60,17 +92,64 @@ def _key_problem(fleet: Fleet, key: str) -> str | None:
     return problem
 
 
+def _value_problems(fleet: Fleet, key: str, values: Sequence[Any]) -> Iterator[str]:
+    """Values of a sweep that are of another kind than the parameter's; numbers out of range are points without a row.
+
+    Of a parameter that the file leaves out nothing is known here.
+    """
+    try:
+        own = fleet.value_of(key)
+    except FleetError:
+        return
+    kind = _kind(own)
+    wrong = [value for value in values if _kind(value) != kind]
+    if wrong:
+        yield f"parameters must have {_KINDS[kind]} for {key!r}, got {', '.join(shown(value) for value in wrong)}"
+    elif kind == "words":
+        for value in values:
+            try:
+                fleet.replaced({key: value})
+            except FleetError as error:
+                yield str(error).removeprefix(f"{fleet.path}: ").splitlines()[0]
+
+
+def _kind(value: Any) -> str:
+    """What a value is; a number and a list or table of them may stand for each other."""
+    if isinstance(value, tuple):
+        kinds = {_kind(entry) for entry in value}
+        return kinds.pop() if len(kinds) == 1 else "mixed"
+    return "truth" if isinstance(value, bool) else "words" if isinstance(value, str) else "numbers"
+
+
+def _all_named(fleet: Fleet, feature: Feature) -> Iterator[str]:
+    """A place of the extreme that could be anywhere."""
+    known = fleet.operation.names if feature.over == "conditions" else _angles(fleet)
+    if feature.at and set(known) <= set(feature.at):
+        what = "conditions" if feature.over == "conditions" else "helix angles"
+        yield f"at names all {what}, so that nothing is said: leave out where the {feature.shape[:-3]} value is not"
+
+
 def _foreign(fleet: Fleet, names: Sequence[str]) -> Iterator[str]:
-    known = fleet.operation.names
-    for name in names if known else ():
-        if name not in known:
-            yield f"there is no condition {name!r}; the nearest is {nearest(name, known) or known[0]!r}"
+    if fleet.operation.names:
+        yield from _foreign_names(names, fleet.operation.names)
+
+
+def _foreign_names(names: Sequence[str], known: Sequence[str]) -> Iterator[str]:
+    foreign = [name for name in names if name not in known]
+    if foreign:
+        near = "" if len(foreign) > 1 or not known else f"; the nearest is {nearest(foreign[0], known) or known[0]!r}"
+        named = ", ".join(repr(name) for name in foreign)
+        yield f"there is no condition {named}{near}; there are {', '.join(known) or 'none'}"
 
 
 def _foreign_angles(fleet: Fleet, angles: Sequence[str]) -> Iterator[str]:
+    known = _angles(fleet)
+    foreign = [angle for angle in angles if angle not in known]
+    if foreign:
+        has = f"has {', '.join(known)}" if known else "has none"
+        yield f"there is no helix angle {', '.join(f'{a}°' for a in foreign)}: [operation] helix_angle_deg {has}"
+
+
+def _angles(fleet: Fleet) -> tuple[str, ...]:
     stated = fleet.operation.helix_angle_deg
-    known = () if stated is None else tuple(f"{angle:g}" for angle in stated.value)
-    for angle in angles:
-        if angle not in known:
-            has = f"has {', '.join(known)}" if known else "has none"
-            yield f"there is no helix angle {angle}°: [operation] helix_angle_deg {has}"
+    return () if stated is None else tuple(f"{angle:g}" for angle in stated.value)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal, TypeAlias
 
 from pydantic import AfterValidator, Field, PlainValidator, model_validator
 
+from tdacoustic.fleet.keys import flat_keys
 from tdacoustic.toml_models import Name, Table, each_once, shown
 
 __all__ = ["OFF", "Changes", "WhatIf"]
@@ -35,20 +36,19 @@ def _change_db(value: Any) -> Any:
 def _changes(value: Any) -> Changes:
     """A table of dotted keys; keys without quotes come as tables in tables and mean the same."""
     if isinstance(value, Mapping):
-        return tuple(_flat(value))
+        if not value:
+            raise ValueError(
+                'must name a key with its new value, as { "masuda.constant_db" = 20 }, got an empty table; leave it '
+                "out where no parameter changes"
+            )
+        pairs = flat_keys(value)
+        for key, new in pairs:
+            if not _is_numeric(new):
+                raise ValueError(f"{key} must be a number or a list of numbers, got {shown(new)}")
+        return pairs
     if isinstance(value, tuple) and all(isinstance(pair, tuple) and len(pair) == 2 for pair in value):
         return value  # as it was made here before
     raise ValueError(f"must be a table of keys of the fleet and their values, got {shown(value)}")
-
-
-def _flat(table: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            yield from _flat(value, f"{before}{key}.")
-        elif not _is_numeric(value):
-            raise ValueError(f"{before}{key} must be a number or a list of numbers, got {shown(value)}")
-        else:
-            yield f"{before}{key}", value
 
 
 def _is_numeric(value: Any) -> bool:

@@ -32,7 +32,7 @@ def calibration_report(result: CampaignCalibration) -> Document:
             Section("versions", "Versions", [Facts(list(result.versions.items()))]),
         ],
     )
-    asked = None if result.what_if is None else what_if_section(result.what_if)
+    asked = None if result.what_if is None else what_if_section(result.what_if, result.calibration.fleet)
     return Document(
         title=campaign.name,
         subtitle=f"The model of {result.fleet.name}, calibrated to the campaign's levels",

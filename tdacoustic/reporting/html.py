@@ -39,6 +39,7 @@ from tdacoustic.reporting.document import (
     walk,
 )
 from tdacoustic.reporting.figure import Heatmap
+from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
 from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
@@ -202,6 +203,7 @@ class _Views:
             "png": Markup(base64.b64encode(png).decode("ascii")),
             "width": width,
             "height": height,
+            "narrow": figure_width(figure) if figure.equal else None,
             "reduced": is_reduced(figure),
             "json": self.payload(block),
         }

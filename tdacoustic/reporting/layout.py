@@ -6,6 +6,7 @@ import math
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
@@ -13,16 +14,38 @@ from tdacoustic.reporting.decimate import FloatArray, drawn
 from tdacoustic.reporting.figure import Band, Bars, Figure, Heatmap, Line, Markers, Rule
 
 __all__ = [
+    "COLUMN_WIDTH",
     "Label",
     "Placed",
     "axis_ranges",
     "cell_edges",
+    "figure_width",
     "label_heights",
     "log_ticks",
     "place_labels",
     "tick_text",
     "wrapped",
 ]
+
+COLUMN_WIDTH: Final = 900
+"""Pixels that a figure is wide in the page where there is room."""
+_BESIDE, _ABOVE_AND_BELOW, _SCALE, _NARROWEST = 92, 90, 92, 420
+"""Pixels beside the plot and above and below it, for the scale of a map, and of the narrowest figure [assumed]."""
+
+
+def figure_width(figure: Figure) -> int:
+    """Return how wide a figure is drawn, in pixels: the column, and of a map with equal axes what its shape needs.
+
+    Parameters
+    ----------
+    figure : Figure
+    """
+    if not figure.equal:
+        return COLUMN_WIDTH
+    (left, right), (bottom, top) = axis_ranges(figure)
+    plot = (figure.height - _ABOVE_AND_BELOW) * (right - left) / (top - bottom)
+    scale = _SCALE if any(isinstance(element, Heatmap) for element in figure.elements) else 0
+    return int(min(max(plot + _BESIDE + scale, _NARROWEST), COLUMN_WIDTH))
 
 
 def _x_values(figure: Figure) -> list[FloatArray]:

@@ -17,9 +17,11 @@ import numpy as np
 from tdacoustic.reporting.decimate import FloatArray, block_max, drawn, minmax_indices
 from tdacoustic.reporting.figure import Axis, Band, Bars, Figure, Heatmap, Line, Markers, ReportError, Rule
 from tdacoustic.reporting.layout import (
+    COLUMN_WIDTH,
     Label,
     axis_ranges,
     cell_edges,
+    figure_width,
     label_heights,
     log_ticks,
     place_labels,
@@ -36,8 +38,8 @@ __all__ = ["plot", "render_png", "render_svg"]
 
 WIDTH_IN: Final = 7.2
 """Width of a printed figure: the text width of a page of A4."""
-INCHES_PER_PIXEL: Final = WIDTH_IN / 900
-"""A figure as wide as the page's column, 900 pixels, is printed `WIDTH_IN` wide."""
+INCHES_PER_PIXEL: Final = WIDTH_IN / COLUMN_WIDTH
+"""A figure as wide as the page's column is printed `WIDTH_IN` wide."""
 MAX_POINTS: Final = 6000
 
 _DASH: Final[dict[str, Any]] = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.8)), "steps": "-"}
@@ -187,7 +189,8 @@ def _draw_elements(axes: Axes, figure: Figure, coarse: bool) -> None:
             )
 
 
-def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], height: float) -> None:
+def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], room: float) -> None:
+    """Scale, ticks, limits and title of an axis; `room` in points for the title."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
     one = axes.xaxis if which == "x" else axes.yaxis
@@ -200,15 +203,14 @@ def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], h
             one.set_minor_locator(NullLocator())
     ends = tuple(10.0**end for end in limits) if axis.log else limits
     (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
-    room = WIDTH_IN * 72 - 60 if which == "x" else height - 44
     (axes.set_xlabel if which == "x" else axes.set_ylabel)("\n".join(wrapped(axis.caption, room, 4.3)))
 
 
-def _set_legend(canvas: MatplotlibFigure, axes: Axes) -> None:
+def _set_legend(canvas: MatplotlibFigure, axes: Axes, width: float) -> None:
     handles, names = axes.get_legend_handles_labels()
     if len(names) < 2:
         return
-    room = WIDTH_IN * 72 - 40
+    room = width - 40
     widths = [len(name) * 4.2 + 34 for name in names]
     columns = max(1, min(len(names), int(room / max(widths))))
     canvas.legend(handles, names, loc="outside upper left", ncols=columns, handlelength=1.8, columnspacing=1.6)
@@ -270,21 +272,21 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
         def _repr_png_(self) -> bytes:
             return _png(self, 150)
 
-    canvas = NotebookFigure(figsize=(WIDTH_IN, figure.height * INCHES_PER_PIXEL), layout="constrained")
+    width, height = (72.0 * INCHES_PER_PIXEL * pixels for pixels in (figure_width(figure), figure.height))
+    canvas = NotebookFigure(figsize=(width / 72.0, height / 72.0), layout="constrained")
     FigureCanvasAgg(canvas)
     canvas.get_layout_engine().set(w_pad=0.05, h_pad=0.04)  # type: ignore[union-attr, call-arg]
     axes = canvas.add_subplot()
     _draw_elements(axes, figure, coarse)
     x_range, y_range = axis_ranges(figure)
-    height = figure.height * INCHES_PER_PIXEL * 72
-    _set_axis(axes, figure.x_axis, "x", x_range, height)
-    _set_axis(axes, figure.y_axis, "y", y_range, height)
+    _set_axis(axes, figure.x_axis, "x", x_range, width - 60)
+    _set_axis(axes, figure.y_axis, "y", y_range, height - 44)
     if figure.equal:
         axes.set_aspect("equal", adjustable="box")
     heat = any(isinstance(element, Heatmap) for element in figure.elements)
     axes.grid(not heat, axis="y" if figure.categories else "both")
     if figure.categories:
-        crowded = sum(len(name) + 2 for name in figure.categories) * 4.2 > WIDTH_IN * 72 - 60
+        crowded = sum(len(name) + 2 for name in figure.categories) * 4.2 > width - 60
         axes.set_xticks(range(len(figure.categories)), figure.categories, rotation=45 if crowded else 0)
         axes.tick_params(axis="x", length=0)
         if crowded:
@@ -292,7 +294,7 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
                 label.set(ha="right", rotation_mode="anchor")
     if title:
         axes.set_title(figure.title, loc="left", fontsize=8.5, fontweight="bold")
-    _set_legend(canvas, axes)
+    _set_legend(canvas, axes, width)
     _draw_labels(canvas, axes, figure)
     return canvas
 
@@ -312,7 +314,7 @@ def _png(canvas: MatplotlibFigure, dpi: int, colours: int | None = None) -> byte
 
 
 def render_png(figure: Figure, dpi: int = 200, colours: int | None = None) -> bytes:
-    """Draw a figure as a PNG, 7.2 inches wide.
+    """Draw a figure as a PNG, 7.2 inches wide; a map with equal axes as wide as its shape needs.
 
     Parameters
     ----------

@@ -68,8 +68,9 @@ class CampaignResult:
     @property
     def records(self) -> tuple[tuple[str, Record], ...]:
         """Key and record of every step, upstream first."""
+        of_fit = () if self.calibration is None else self.calibration.records
         of_model = () if self.prediction is None else self.prediction.records
-        return tuple(dict((*self.analysis.records, *of_model)).items())
+        return tuple(dict((*self.analysis.records, *of_fit, *of_model)).items())
 
 
 def _plain(value: Any) -> Any:

@@ -1,6 +1,7 @@
 """Studies of a drive model: design sweeps, sensitivities, and another source's numbers and features beside its own."""
 
-from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel, CaseValues, conditions_under
+from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel, CaseValues
+from tdacoustic.studies.changed_fleet import conditions_under
 from tdacoustic.studies.checks import (
     FeatureCheck,
     Findings,

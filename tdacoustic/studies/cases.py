@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Final, Literal, get_args
 
@@ -19,23 +19,19 @@ from tdacoustic.drive import (
     HousingSound,
     Receiver,
     StructureSource,
-    conditions_of,
     gear_unit_of,
-    torque_at,
 )
-from tdacoustic.drive.housing_box import box_of
 from tdacoustic.drive.levels import CIRCLE_DEG
 from tdacoustic.drive.patterns import FLAT_DB, least_alike, range_db
 from tdacoustic.drive.sources import SoundSource
 from tdacoustic.errors import FleetError
-from tdacoustic.fleet import Fleet, Kinematics
+from tdacoustic.fleet import Fleet
 from tdacoustic.fleet.studies import Quantity
 from tdacoustic.gears import DIRECTIONS, GEARS, SteadyState, balanced_state
-from tdacoustic.housing import Box
 from tdacoustic.radiation import overall_level_db
-from tdacoustic.steps import Task
+from tdacoustic.studies.changed_fleet import conditions_under, housing_signature, reseated
 
-__all__ = ["QUANTITIES", "Case", "CaseModel", "CaseValues", "conditions_under", "housing_signature", "housing_under"]
+__all__ = ["QUANTITIES", "Case", "CaseModel", "CaseValues"]
 
 Real = NDArray[np.float64]
 
@@ -44,8 +40,6 @@ QUANTITIES: Final[tuple[str, ...]] = tuple(name for name in get_args(Quantity) i
 
 _COLUMN: Final = {name: place for place, name in enumerate(QUANTITIES)}
 _PATHS: Final = ("structure", "mesh", "motor")
-_OF_VECTORS: Final = ("housing.", "radiation.", "train.", "motor.position_m", "masuda.p", "gear_pair.")
-_NOT_OF_VECTORS: Final = (".loss_factor", ".face_width_mm", ".backlash_um", ".transmission_error_um")
 _OF_POINT_SOURCES: Final = ("radiation", "train", "housing", "masuda.placement", "masuda.position_m")
 """What it may depend on how a point source of some frequency and place is heard."""
 
@@ -158,7 +152,7 @@ class _Model(DriveModel):
         for row, source in zip(found, sources, strict=True):
             row[:] = source.sound_power_level_db + self._transfer_db(source, receivers)
             if self.fleet.radiation.air_absorption.value:
-                row -= self.field._absorbed_db(source, receivers)
+                row -= self.field.absorbed_db(source, receivers)
         return found
 
     def _transfer_db(self, source: SoundSource, receivers: Sequence[Receiver]) -> Real:
@@ -238,7 +232,7 @@ class CaseModel:
         conditions = self._conditions
         if not (same_gears and changed.train == self.fleet.train and changed.operation == self.fleet.operation):
             conditions = conditions_under(self.fleet, changed, conditions)
-        housing = None if self._housing is None else _reseated(self._housing, self.fleet, changed, unit)
+        housing = None if self._housing is None else reseated(self._housing, self.fleet, changed, unit)
         same_air = all(attrgetter(name)(changed) == attrgetter(name)(self.fleet) for name in _OF_POINT_SOURCES)
         model = _Model(changed, unit, housing, self._known, same_air=same_air, integrate=integrate)
         return self._values(model, helix, conditions)
@@ -288,65 +282,14 @@ def _alike(cases: Sequence[Case], states: Sequence[GearState | None], patterns: 
     return found
 
 
-def housing_signature(fleet: Fleet) -> tuple[str, ...]:
-    """Return what tells two housings apart whose modes or transfer vectors differ; nothing of point sources.
-
-    Of a box the keys of the tasks behind its field. Of a STEP file every parameter that these could depend on: its
-    tasks would read the file.
-
-    Parameters
-    ----------
-    fleet : Fleet
-
-    Raises
-    ------
-    FleetError
-        No such housing can be.
-    """
-    if fleet.radiation.method.value == "point_sources":
-        return ()
-    if fleet.housing is not None and fleet.housing.step_file is not None:
-        stated = (one for one in fleet.parameters() if one.key.startswith(_OF_VECTORS))
-        return tuple(f"{one.key} = {one.value!r}" for one in stated if not one.key.endswith(_NOT_OF_VECTORS))
-    from tdacoustic.drive.housing_steps import housing_tasks
-    from tdacoustic.drive.source_inside import cavity_task
-
-    tasks = housing_tasks(fleet)
-    held: list[object] = []
-    for one in (getattr(tasks, name.name) for name in fields(tasks)):
-        held += one if isinstance(one, tuple) else (one,)
-    if fleet.masuda.placement.value == "inside":
-        held.append(cavity_task(fleet, gear_unit_of(fleet), tasks.box, tasks.body, tasks.modes))
-    return tuple(task.key for task in held if isinstance(task, Task))
-
-
-def housing_under(before: Fleet, after: Fleet, housing: HousingSound | None) -> HousingSound | None:
-    """Return the housing of a changed fleet that needs no modes, transfer vectors or air inside of its own; else None.
-
-    Parameters
-    ----------
-    before, after : Fleet
-    housing : HousingSound or None
-        Of the first.
-    """
-    if housing is None or housing_signature(before) != housing_signature(after):
-        return None
-    return _reseated(housing, before, after, gear_unit_of(after))
-
-
-def _reseated(housing: HousingSound, before: Fleet, after: Fleet, unit: GearUnit) -> HousingSound:
-    """Return a housing with the loss factor and the gears' places between the bearings of a changed fleet."""
-    if after.housing != before.housing and isinstance(housing.box, Box):
-        return replace(housing, box=box_of(after, unit))
-    return housing
-
-
 def _around_db(model: _Model, sources: Sequence[SoundSource]) -> Real:
-    """Total level around the circle; NaN of no sound."""
+    """Total level around the circle; NaN of no sound, minus infinity where none arrives."""
     held = [source for source in sources if source.path in model.field.adds]
     if not held:
         return np.full(len(CIRCLE_DEG), math.nan)
-    return np.asarray(10.0 * np.log10(np.sum(10.0 ** (0.1 * model.received_db(held, model.field.circle)), axis=0)))
+    energy = np.sum(10.0 ** (0.1 * model.received_db(held, model.field.circle)), axis=0)
+    with np.errstate(divide="ignore"):
+        return np.asarray(10.0 * np.log10(energy))
 
 
 def _fill(row: Real, model: _Model, state: GearState, sources: Sequence[SoundSource]) -> None:
@@ -372,52 +315,3 @@ def _fill_around(row: Real, pattern: Real) -> None:
     row[_COLUMN["range_12m_db"]] = range_db(pattern)
     if range_db(pattern) >= FLAT_DB:
         row[_COLUMN["loudest_deg"]] = CIRCLE_DEG[int(pattern.argmax())]
-
-
-def conditions_under(fleet: Fleet, changed: Fleet, conditions: Sequence[Condition]) -> tuple[Condition, ...]:
-    """Return conditions as they become when the fleet changes.
-
-    Those of ``[operation]`` are read again. Of others, as of a campaign, the torque and the motor's speed follow the
-    changed fleet where they followed the fleet before; what was measured stays.
-
-    Parameters
-    ----------
-    fleet, changed : Fleet
-    conditions : sequence of Condition
-        Under `fleet`.
-
-    Raises
-    ------
-    FleetError
-        The changed torque law lacks what it needs.
-    """
-    own = _by_name(fleet)
-    of_changed = _by_name(changed) if own else {}
-    found = []
-    before, after = Kinematics.of(fleet), Kinematics.of(changed)
-    for held in conditions:
-        if own.get(held.name) == held and held.name in of_changed:
-            found.append(of_changed[held.name])
-            continue
-        speed = held.train_speed_km_h
-        rolls = math.isclose(held.motor_hz, before.motor_hz_at_km_h(speed), rel_tol=1e-9)
-        motor_hz = after.motor_hz_at_km_h(speed) if rolls else held.motor_hz
-        torque, mode = held.torque_n_m, held.mode
-        if mode == fleet.operation.mode.value and _is_of_the_law(fleet, held):
-            torque, mode = torque_at(changed, speed), changed.operation.mode.value
-        found.append(replace(held, motor_hz=motor_hz, torque_n_m=torque, mode=mode))
-    return tuple(found)
-
-
-def _by_name(fleet: Fleet) -> dict[str, Condition]:
-    """Conditions of ``[operation]``; none where it names no speeds."""
-    stated = fleet.operation.train_speed_km_h is not None
-    return {condition.name: condition for condition in conditions_of(fleet)} if stated else {}
-
-
-def _is_of_the_law(fleet: Fleet, condition: Condition) -> bool:
-    try:
-        lawful = torque_at(fleet, condition.train_speed_km_h)
-    except FleetError:
-        return False
-    return math.isclose(condition.torque_n_m, lawful, rel_tol=1e-9)

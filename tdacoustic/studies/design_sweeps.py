@@ -17,7 +17,8 @@ from tdacoustic.fleet import Fleet
 from tdacoustic.fleet.studies import DesignSweep
 from tdacoustic.steps import Step, Task
 from tdacoustic.steps.progress import tell_progress
-from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel, housing_signature
+from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel
+from tdacoustic.studies.changed_fleet import housing_signature
 from tdacoustic.studies.responses import ModelSettings, bare_fleet, fleet_of, reason_of
 
 __all__ = [

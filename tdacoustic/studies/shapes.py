@@ -7,12 +7,15 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LEAST_VALUES", "direction_margin", "extreme_margin", "shape_margin", "span_margin"]
+__all__ = ["LEAST_VALUES", "direction_margin", "extreme_margin", "shape_margin", "shape_of", "span_margin"]
 
 Real = NDArray[np.float64]
 
 LEAST_VALUES: Final = {"rises": 2, "falls": 2, "flat": 2, "rises_then_falls": 3, "flat_or_rises_then_falls": 3}
 """Values that a series must have at least to have a shape."""
+
+_NAMED: Final = ("flat", "rises", "falls", "rises_then_falls")
+"""Shapes that `shape_of` looks for, in this order."""
 
 
 def shape_margin(shape: str, values: Real, tolerance: float) -> Real:
@@ -20,12 +23,14 @@ def shape_margin(shape: str, values: Real, tolerance: float) -> Real:
 
     With first, last, largest and smallest value of a series and its tolerance t, the margin is the least of
 
-    - ``rises``: last - first - t; t - (largest - last); t - (first - smallest);
-    - ``falls``: first - last - t; t - (largest - first); t - (last - smallest);
-    - ``rises_then_falls``: peak - first - t; peak - last - t, the peak being the best of the values between first and
-      last (others may dip);
-    - ``flat_or_rises_then_falls``: peak - first + t; peak - last - t, with such a peak;
+    - ``rises``: last - first - t; t + least step;
+    - ``falls``: the same of the series times -1;
+    - ``rises_then_falls``: peak - first - t; peak - last - t; t + least step up to the peak; t + least step down from
+      it; the peak is that of the values between first and last for which this is most;
+    - ``flat_or_rises_then_falls``: the same with peak - first + t;
     - ``flat``: t - (largest - smallest).
+
+    A step is from one value to any later one, so that the least step up is below zero by the largest dip.
 
     Parameters
     ----------
@@ -42,17 +47,46 @@ def shape_margin(shape: str, values: Real, tolerance: float) -> Real:
     if values.shape[-1] < LEAST_VALUES[shape]:
         return np.full(values.shape[:-1], np.nan)
     first, last = values[..., 0], values[..., -1]
-    high, low = values.max(axis=-1), values.min(axis=-1)
     if shape == "flat":
-        return np.asarray(tolerance - (high - low))
-    if shape == "rises":
-        return _least(last - first - tolerance, tolerance - (high - last), tolerance - (first - low))
+        return np.asarray(tolerance - (values.max(axis=-1) - values.min(axis=-1)))
     if shape == "falls":
-        return _least(first - last - tolerance, tolerance - (high - first), tolerance - (last - low))
+        first, last, values = -first, -last, -values
+    up = _least_steps(values)
+    if shape in ("rises", "falls"):
+        return _least(last - first - tolerance, tolerance + up[..., -1])
     after_first = tolerance if shape == "flat_or_rises_then_falls" else -tolerance
+    down = _least_steps(values[..., ::-1])[..., ::-1]
     between = values[..., 1:-1]
-    peaks = np.minimum(between - first[..., None] + after_first, between - last[..., None] - tolerance)
+    peaks = _least(
+        between - first[..., None] + after_first,
+        between - last[..., None] - tolerance,
+        tolerance + up[..., :-1],
+        tolerance + down[..., 1:],
+    )
     return np.asarray(peaks.max(axis=-1))
+
+
+def _least_steps(values: Real) -> Real:
+    """Least step from a value to a later one, up to each value but the first, shape (..., n - 1)."""
+    steps = values[..., 1:] - np.maximum.accumulate(values, axis=-1)[..., :-1]
+    return np.asarray(np.minimum.accumulate(steps, axis=-1))
+
+
+def shape_of(values: Real, tolerance: float) -> str | None:
+    """Return the shape of one series by the margins of `shape_margin`; None of another one, or where it has a gap.
+
+    Parameters
+    ----------
+    values : ndarray, shape (n,)
+        In order.
+    tolerance : float
+
+    Examples
+    --------
+    >>> shape_of(np.array([60.0, 64.0, 62.0]), 0.5), shape_of(np.array([64.0, 60.0, 64.0]), 0.5)
+    ('rises_then_falls', None)
+    """
+    return next((shape for shape in _NAMED if float(shape_margin(shape, values, tolerance)) >= 0.0), None)
 
 
 def extreme_margin(values: Real, at: NDArray[np.bool_], highest: bool, tolerance: float) -> Real:

@@ -13,6 +13,7 @@ from tdacoustic.studies.cases import Case
 from tdacoustic.studies.checks import FeatureCheck, Findings, Influence, Move, ReferenceCheck
 
 __all__ = [
+    "UNITS",
     "CheckWords",
     "difference_words",
     "feature_words",
@@ -23,7 +24,9 @@ __all__ = [
     "unit_of",
 ]
 
-_UNITS: Final = {"db": "dB", "um": "µm", "n": "N", "hz": "Hz", "deg": "°"}
+UNITS: Final = {"db": "dB", "um": "µm", "n": "N", "hz": "Hz", "deg": "°"}
+"""Of quantities, by the last part of their names."""
+
 _UNITS_OF_KEYS: Final = {
     **{"_n_per_m": "N/m", "_kg_m2": "kg m²", "_kg_m3": "kg/m³", "_kg": "kg", "_n_m": "N m", "_um": "µm", "_mm": "mm"},
     **{"_km_h": "km/h", "_db": "dB", "_hz": "Hz", "_gpa": "GPa", "_kw": "kW", "_t": "T", "_degc": "°C", "_deg": "°"},
@@ -169,11 +172,11 @@ def margin_words(check: FeatureCheck) -> str:
     if math.isnan(check.margin):
         return ""
     unit = _margin_unit(check.feature)
-    return f"{_signed(check.margin, 1 if unit else 2)}{unit}"
+    return f"{_signed(check.margin, 2 if check.feature.shape == 'alike' else 1)}{unit}"
 
 
 def _margin_unit(feature: Feature) -> str:
-    return "" if feature.shape == "alike" else "°" if feature.shape == "toward" else " dB"
+    return " in correlation" if feature.shape == "alike" else "°" if feature.shape == "toward" else " dB"
 
 
 def feature_words(check: FeatureCheck, fleet: Fleet) -> CheckWords:
@@ -197,7 +200,8 @@ def _claim(feature: Feature, fleet: Fleet) -> str:
     what = quantity_words(feature.quantity, fleet)
     along = "with speed" if feature.over == "conditions" else "with the helix angle"
     every = "in every condition" if feature.over == "conditions" else "at every helix angle"
-    at = f"{'condition' if feature.over == 'conditions' else 'helix angle'} {' or '.join(feature.at)}"
+    names = " or ".join(feature.at)
+    at = f"in condition {names}" if feature.over == "conditions" else f"at helix angle {names}°"
     value = 0.0 if feature.value is None else feature.value
     said = {
         "rises": f"rises {along}",
@@ -205,8 +209,8 @@ def _claim(feature: Feature, fleet: Fleet) -> str:
         "rises_then_falls": f"rises, then falls {along}",
         "flat_or_rises_then_falls": f"stays or rises at first, then falls {along}",
         "flat": f"does not change {along}",
-        "highest_at": f"is highest in {at}",
-        "lowest_at": f"is lowest in {at}",
+        "highest_at": f"is highest {at}",
+        "lowest_at": f"is lowest {at}",
         "span": f"differs by {value:g} dB between the extremes {along}",
         "above": f"is above that along {' and '.join(name.split('_')[2] for name in feature.than)} {every}"
         if all("_force_" in name for name in feature.than)
@@ -233,7 +237,8 @@ def _why_not(check: FeatureCheck, fleet: Fleet) -> str:
         return "fewer than two of the patterns have a shape, 1 dB or more between directions"
     missing = [case for case, value in zip(check.cases, check.values, strict=True) if math.isnan(value)]
     if missing:
-        return f"there is no {quantity_words(check.feature.quantity, fleet)} at {_cases(missing)}"
+        where = "at" if check.feature.over == "helix" else "in"
+        return f"there is no value of the {quantity_words(check.feature.quantity, fleet)} {where} {_cases(missing)}"
     if not check.cases:
         return "nothing was computed over that"
     return "too few values"
@@ -286,7 +291,7 @@ def _plain(value: float) -> str:
 
 
 def _unit(quantity: str) -> str:
-    unit = _UNITS.get(quantity.rpartition("_")[2], "")
+    unit = UNITS.get(quantity.rpartition("_")[2], "")
     return unit if unit == "°" else f" {unit}"
 
 

@@ -1,4 +1,8 @@
-"""Rows of ``coupling.csv`` and ``coupling_conditions.csv``."""
+"""Rows of ``coupling.csv`` and ``coupling_conditions.csv``.
+
+In the first ``..._force_..._db`` are amplitudes of bearing forces in dB re 1 N per um of transmission error, both peak;
+in the second ``..._spl_4m_..._db`` are levels re 20 uPa.
+"""
 
 from __future__ import annotations
 

@@ -53,8 +53,8 @@ COLUMNS: Final = MappingProxyType(
         "pattern_correlation": "sweep first second correlation difference_db both_shaped",
         "sensitivity": "parameter origin value condition helix_angle_deg path per change_db not_varied",
         "references": f"quantity condition helix_angle_deg kind origin reference_value model_value model_condition "
-        f"difference tolerance verdict {_FINDINGS} sentence",
-        "features": f"feature quantity over shape origin tolerance margin verdict {_FINDINGS} sentence",
+        f"difference tolerance verdict {_FINDINGS} sentence unit difference_unit",
+        "features": f"feature quantity over shape origin tolerance margin verdict {_FINDINGS} sentence margin_unit",
         "sweep_points": "sweep point parameter value words reason",
         "sweeps": "sweep point condition train_speed_km_h parameters structure_spl_4m_db mesh_spl_4m_db "
         "motor_spl_4m_db spl_4m_db masuda_spl_1m_db dte_pp_um range_12m_db loudest_deg reason",
@@ -75,6 +75,7 @@ TEXT_COLUMNS: Final = frozenset(
         *(f"influence_{number}{of}" for number in "123" for of in ("", "_per")),
         *("mode", "method", "gear", "direction", "receiver", "path", "sweep"),
         *("coupling", "plane", "place", "case"),
+        *("unit", "difference_unit", "margin_unit"),
     }
 )
 """Columns that hold words, even where the words are digits."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Final
 
 from tdacoustic.drive import Directivity, Prediction
 from tdacoustic.drive.patterns import pattern_of, pattern_pairs
@@ -33,6 +33,10 @@ SWEPT = (
     *("range_12m_db", "loudest_deg"),
 )
 """Quantities of a sweep's table."""
+
+
+_UNITS: Final = {"db": "dB", "um": "um", "n": "N", "hz": "Hz", "deg": "deg"}
+"""Of a quantity, by the last part of its name."""
 
 
 def pattern_tables(prediction: Prediction) -> dict[str, pd.DataFrame]:
@@ -150,6 +154,8 @@ def _reference_row(check: ReferenceCheck, fleet: Fleet) -> Row:
         "verdict": _verdict(check.holds),
         **_findings_row(check.findings),
         "sentence": reference_words(check, fleet).text,
+        "unit": _UNITS[reference.quantity.rpartition("_")[2]],
+        "difference_unit": "deg" if reference.quantity == "loudest_deg" else "dB",
     }
 
 
@@ -166,6 +172,7 @@ def _feature_row(check: FeatureCheck, fleet: Fleet) -> Row:
         "verdict": _verdict(check.holds),
         **_findings_row(check.findings),
         "sentence": feature_words(check, fleet).text,
+        "margin_unit": {"alike": "correlation", "toward": "deg"}.get(feature.shape, "dB"),
     }
 
 

@@ -55,26 +55,28 @@ def calibrate(
     from tdacoustic.drive import gear_unit_of
     from tdacoustic.drive.doubts import structure_doubts
     from tdacoustic.fitting.calibration import calibrate_fleet
+    from tdacoustic.fitting.free import checked_free
     from tdacoustic.fitting.levels import LevelModel
     from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignCalibration
     from tdacoustic.workflows.calibration_setup import candidates_of, fit_settings, free_parameters
-    from tdacoustic.workflows.housing_sound import checked_free, housing_sound
+    from tdacoustic.workflows.housing_sound import housing_sound
     from tdacoustic.workflows.joint_levels import joint_levels
     from tdacoustic.workflows.microphones import microphones
-    from tdacoustic.workflows.what_if import calibrated_what_if
+    from tdacoustic.workflows.what_if import calibrated_what_if, checked_cases
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     if campaign.fleet is None:
         raise CampaignError(f"{campaign.path}: fleet is missing, and a calibration needs it")
     fleet = load_fleet(campaign.fleet.path)
+    checked_cases(campaign, fleet)
     if analysis is None and campaign.runs:
         analysis = _analyzed(campaign, store, jobs, progress)
     joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
     free, transferred, earlier = free_parameters(campaign, fleet, joint.campaigns)
     try:
-        checked_free(fleet, [parameter.name for parameter in free if parameter.expression is None])
+        checked_free(fleet, [parameter.name for parameter in free])
     except FittingError as error:
         raise CampaignError(f"{campaign.path}: [calibration]: {error}") from error
     places = (*microphones(campaign, fleet).values(), *(datum.receiver for datum in joint.data))

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from tdacoustic.fleet import Fleet
     from tdacoustic.steps import Record
 
-__all__ = ["checked_free", "housing_sound"]
+__all__ = ["housing_sound"]
 
 _MOST_BYTES: Final = 12e9
 """Memory that boundary elements in several processes may take together [assumed]."""
@@ -70,39 +70,3 @@ def _jobs(tasks: HousingTasks, fleet: Fleet) -> int:
     """Processes, one a core, or fewer where their systems together would not fit into memory."""
     needed = tasks.body.needed_bytes(fleet.radiation.max_frequency_hz.value)
     return max(1, min(os.cpu_count() or 1, int(_MOST_BYTES // needed)))
-
-
-def checked_free(fleet: Fleet, names: Sequence[str]) -> None:
-    """Raise for parameters whose every value would ask for modes or transfer vectors of its own.
-
-    Parameters
-    ----------
-    fleet : Fleet
-    names : sequence of str
-        Of parameters that a calibration is to move; those that are none of the fleet's are not looked at.
-
-    Raises
-    ------
-    FittingError
-    """
-    if fleet.radiation.method.value == "point_sources":
-        return
-    from tdacoustic.drive.housing_steps import housing_tasks
-    from tdacoustic.drive.insertion_loss import air_tasks
-    from tdacoustic.errors import FittingError
-
-    def keys(of: Fleet) -> tuple[str, ...]:
-        tasks = housing_tasks(of)
-        inside = air_tasks(of, tasks)[:1] if of.masuda.placement.value == "inside" else ()
-        return tuple(task.key for task in (tasks.modes, tasks.mean, *inside))
-
-    before = keys(fleet)
-    for name in names:
-        if "." not in name or "[" in name:
-            continue
-        value = fleet.value_of(name)
-        if keys(fleet.replaced({name: 0.9999 * value if value else 1e-3})) != before:
-            raise FittingError(
-                f"{name} cannot be free with boundary elements: the housing's modes or transfer vectors depend on it, "
-                "and each value of it would take minutes"
-            )

@@ -14,6 +14,7 @@ from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
     from tdacoustic.drive import Condition, DriveModel, Receiver, SpeedSweep
+    from tdacoustic.drive.what_if import WhatIfAnswer
     from tdacoustic.results import FleetPrediction
     from tdacoustic.steps import Record
 
@@ -27,6 +28,7 @@ def predict(
     conditions: Iterable[Condition] | None = None,
     receivers: Sequence[Receiver] = (),
     jobs: int | None = None,
+    what_if: WhatIfAnswer | None = None,
 ) -> FleetPrediction:
     """Compute the model of a fleet over its ``[operation]``, or over other conditions.
 
@@ -44,6 +46,8 @@ def predict(
         Where levels are wanted besides the 4 m surface.
     jobs : int, optional
         Processes for transfer vectors that are not there yet; default one a core.
+    what_if : WhatIfAnswer, optional
+        What changes do to the levels of this fleet in these conditions at these receivers, where it is known already.
 
     Returns
     -------
@@ -58,6 +62,7 @@ def predict(
 
     from tdacoustic.drive import DriveModel, conditions_of
     from tdacoustic.drive.what_if import check_cases
+    from tdacoustic.fleet.study_problems import check_studies
     from tdacoustic.results import FleetPrediction, LogInput
     from tdacoustic.tables import predicted_tables, what_if_table
     from tdacoustic.tables.studies import pattern_tables, study_tables
@@ -72,7 +77,8 @@ def predict(
     if not held:
         raise FleetError(f"{fleet.path}: there is no condition to compute: no speed is known")
     check_maps(fleet, held)
-    check_cases(fleet, held)
+    check_cases(fleet, [condition.name for condition in held])
+    check_studies(fleet, [condition.name for condition in held])
     housing, transfer_records = housing_sound(fleet, store, jobs, progress, receivers)
     model = DriveModel(fleet, housing=housing)
     with threadpool_limits(limits=1):  # so that the numbers are the same on any number of cores
@@ -80,7 +86,11 @@ def predict(
     sweep, records, doubts = _sweep(model, max(condition.train_speed_km_h for condition in held), store, progress)
     maps, map_records, unmapped = near_fields(fleet, housing, prediction.sound, store, progress)
     prediction = replace(prediction, sweep=sweep, maps=maps, doubts=(*prediction.doubts, *doubts, *unmapped))
-    answer, case_records = predicted_what_if(model, held, prediction.sound, receivers, store, housing, jobs, progress)
+    answer = what_if
+    case_records: tuple[tuple[str, Record], ...] = ()
+    if answer is None:
+        asked = model, held, prediction.sound, receivers, store, housing, jobs, progress
+        answer, case_records = predicted_what_if(*asked)
     prediction = replace(prediction, doubts=(*prediction.doubts, *answer.doubts))
     tables = predicted_tables(prediction, fleet.radiation.max_frequency_hz.value)
     tables["what_if"] = what_if_table(answer)

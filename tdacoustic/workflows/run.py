@@ -20,8 +20,9 @@ from tdacoustic.steps import Store, default_store_path
 from tdacoustic.steps.execution import Progress
 
 if TYPE_CHECKING:
+    from tdacoustic.drive.what_if import WhatIfAnswer
     from tdacoustic.fleet import Fleet
-    from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction
+    from tdacoustic.results import Analysis, CampaignResult, FleetPrediction
 
 __all__ = ["run"]
 
@@ -62,11 +63,15 @@ def run(
     TdacousticError
         The campaign or its fleet is wrong; or nothing can be done: no run can be used and nothing predicted.
     """
+    from tdacoustic.fleet import load_fleet
     from tdacoustic.results import CampaignResult
     from tdacoustic.workflows.calibrate import calibrate
+    from tdacoustic.workflows.what_if import checked_cases
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
+    if campaign.fleet is not None and campaign.fleet.path.is_file():  # one that is not there is told by the analysis
+        checked_cases(campaign, load_fleet(campaign.fleet.path))
     analysis, lost = _measured_side(campaign, store, jobs, progress)
     fleet = analysis.fleet
     if fleet is None:
@@ -75,11 +80,10 @@ def run(
         return CampaignResult(campaign, analysis, None, None, (NO_FLEET,))
     calibration, unfitted = _tried(lambda: calibrate(campaign, store, jobs, progress, analysis=analysis))
     used = fleet if calibration is None else calibration.calibration.fleet
-    prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, jobs, progress))
+    answer = None if calibration is None else calibration.what_if
+    prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, jobs, progress, answer))
     if prediction is None and lost is not None:
         raise lost
-    if prediction is not None and calibration is not None:
-        prediction = _with_intervals(prediction, calibration)
     not_done = _not_done(campaign, fleet, unfitted, unpredicted)
     return CampaignResult(campaign, analysis, calibration, prediction, not_done)
 
@@ -113,27 +117,22 @@ def _predicted(
     store: Store,
     jobs: int | None,
     progress: Progress | None,
+    answer: WhatIfAnswer | None,
 ) -> FleetPrediction:
+    """The prediction; what changes would do is the calibration's, of the same fleet and places, with intervals."""
     from tdacoustic.workflows.measured_levels import campaign_conditions, more_conditions
     from tdacoustic.workflows.microphones import microphone_doubts, microphones
     from tdacoustic.workflows.predict import predict
+    from tdacoustic.workflows.what_if import with_recordings
 
     conditions, doubts = campaign_conditions(campaign, analysis, fleet)
     conditions = {**conditions, **more_conditions(fleet, conditions)}
     receivers = tuple(microphones(campaign, fleet).values())
-    found = predict(fleet, store, progress, conditions.values(), receivers, jobs)
+    found = predict(fleet, store, progress, conditions.values(), receivers, jobs, answer)
+    if found.what_if is not None:
+        found = replace(found, what_if=with_recordings(found.what_if, analysis))
     doubts = [*doubts, *microphone_doubts(campaign, fleet), *found.prediction.doubts]
     return replace(found, prediction=replace(found.prediction, doubts=tuple(dict.fromkeys(doubts))))
-
-
-def _with_intervals(prediction: FleetPrediction, calibration: CampaignCalibration) -> FleetPrediction:
-    """The prediction with the calibration's answer to what changes would do: of the same fleet, with intervals."""
-    from tdacoustic.tables import what_if_table
-
-    answer = calibration.what_if
-    if answer is None:
-        return prediction
-    return replace(prediction, what_if=answer, tables={**prediction.tables, "what_if": what_if_table(answer)})
 
 
 def _not_done(

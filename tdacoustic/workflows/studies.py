@@ -90,7 +90,7 @@ def _swept(
     jobs: int | None,
 ) -> tuple[SweepResult, Records]:
     """A design sweep, points with the same housing in one step."""
-    from tdacoustic.studies.cases import conditions_under
+    from tdacoustic.studies.changed_fleet import conditions_under
     from tdacoustic.studies.design_sweeps import assembled, fleet_at, groups_task, points_of, sweep_task
 
     held = [one for one in conditions if not sweep.conditions or one.name in sweep.conditions]

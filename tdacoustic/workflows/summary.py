@@ -19,8 +19,8 @@ def summary_lines(analysis: Analysis) -> tuple[str, ...]:
 
 
 def run_lines(result: CampaignResult) -> tuple[str, ...]:
-    """Return the sentences of `summary_lines`, then a line each on calibration and prediction where there is one."""
-    from tdacoustic.reporting.sections.run_answer import calibration_line, prediction_line
+    """Return the sentences of `summary_lines`, then a line each on calibration, prediction and what was asked of it."""
+    from tdacoustic.reporting.sections.run_answer import calibration_line, model_lines, prediction_line
 
-    modelled = (calibration_line(result), prediction_line(result))
+    modelled = (calibration_line(result), prediction_line(result), *model_lines(result))
     return (*summary_lines(result.analysis), *(line for line in modelled if line))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
 from tdacoustic.steps import Store
@@ -18,9 +19,41 @@ if TYPE_CHECKING:
     from tdacoustic.results import Analysis
     from tdacoustic.steps import Record
 
-__all__ = ["calibrated_what_if", "predicted_what_if"]
+__all__ = ["calibrated_what_if", "checked_cases", "predicted_what_if", "with_recordings"]
 
 Records: TypeAlias = "tuple[tuple[str, Record], ...]"
+
+
+def checked_cases(campaign: Campaign, fleet: Fleet) -> None:
+    """Raise for what a fleet asks of a condition that neither it nor the campaign has, before anything is computed.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    fleet : Fleet
+
+    Raises
+    ------
+    FleetError
+    """
+    from tdacoustic.drive.what_if import check_cases
+    from tdacoustic.fleet.study_problems import check_studies
+
+    check_cases(fleet, campaign.conditions())
+    check_studies(fleet, campaign.conditions())
+
+
+def with_recordings(answer: WhatIfAnswer, analysis: Analysis | None) -> WhatIfAnswer:
+    """Return an answer that says which part of the recorded sound its lines are.
+
+    Parameters
+    ----------
+    answer : WhatIfAnswer
+    analysis : Analysis or None
+    """
+    verdicts = () if analysis is None else analysis.dominance
+    held = tuple((one.condition, one.line_fraction) for one in verdicts if one.line_fraction is not None)
+    return replace(answer, line_fractions=held)
 
 
 def predicted_what_if(
@@ -117,7 +150,7 @@ def calibrated_what_if(
         if len(heard) != len(model.data):
             model = LevelModel(model.fleet, heard, housing)
         places = WhatIfPlaces(conditions, (drive.field.surface, *receivers), housing, housings)
-        return what_if_intervals(answer, calibration, model, places), records
+        return with_recordings(what_if_intervals(answer, calibration, model, places), analysis), records
 
 
 def _changed(
@@ -130,7 +163,7 @@ def _changed(
 ) -> tuple[Mapping[str, DriveModel], Mapping[str, HousingSound | None], Records]:
     """Models and housings of the cases with other parameters, by name, and the records of the housings' steps."""
     from tdacoustic.drive.what_if import changed_fleet, changed_model
-    from tdacoustic.studies.cases import housing_under
+    from tdacoustic.studies.changed_fleet import housing_under
     from tdacoustic.workflows.housing_sound import housing_sound
 
     models: dict[str, DriveModel] = {}

@@ -2,11 +2,13 @@
 
 import csv
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tdacoustic.drive import conditions_of, torque_at
+from tdacoustic.drive.conditions import followed
 from tdacoustic.errors import FleetError
 
 SHARED = Path(__file__).resolve().parents[3] / "shared"
@@ -68,3 +70,12 @@ def test_a_fleet_without_speeds_has_no_conditions(tmp_path):
     )
     with pytest.raises(FleetError, match=r"\[operation\]: train_speed_km_h is missing, and it is needed here"):
         conditions_of(load_fleet(path))
+
+
+def test_a_condition_that_follows_the_law_takes_its_mode_with_its_torque(reference):
+    held = conditions_of(reference)[2]
+    hauled = reference.replaced({"operation.mode": "hauled"})
+    found = followed(held, reference, hauled)
+    assert (found.torque_n_m, found.mode) == (-held.torque_n_m, "hauled")
+    own = replace(held, torque_n_m=123.0)  # of a run
+    assert followed(own, reference, hauled) == own

@@ -1,6 +1,8 @@
 """Two-way coupling in the drive model: the key, the housing under the bearings, helix angles, the comparison."""
 
 import math
+import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +11,7 @@ from made_up_modes import fleet_text, sound_of_made_up_modes
 
 import tdacoustic as td
 from tdacoustic.drive import DriveModel
-from tdacoustic.drive.coupling import COUPLINGS, coupling_doubts
+from tdacoustic.drive.coupling import COUPLINGS, coupling_doubts, values_of
 from tdacoustic.errors import FleetError
 from tdacoustic.gears import BearingForces, bearing_forces, steady_state
 from tdacoustic.housing import foundation_of, seat_loads
@@ -215,3 +217,46 @@ def test_a_change_of_the_total_is_told(both):
     assert bool(doubts) is (worst >= 1.0)
     assert all("[model] coupling" in doubt for doubt in doubts)
     assert list(coupling_doubts(both[1].coupling, both[1].conditions)) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "contact"),
+    [
+        ({}, True),
+        ({"operation.torque_n_m": 0.0}, None),
+        ({"operation.torque_n_m": 150.0, "gear_pair.1.transmission_error_um": (20.0,)}, False),
+    ],
+)
+def test_teeth_stay_in_contact_part_or_rest(fleet, changes, contact):
+    """Rated torque; none; and too little under a large transmission error."""
+    model = DriveModel(fleet.replaced({"radiation.method": "point_sources", "model.gear_path": "masuda"} | changes))
+    steady = model.motion(replace(model.conditions[-1], motor_hz=30.0))
+    dte, multiplier, found = values_of(steady)
+    assert found is contact
+    assert dte == steady.dte_pp_m
+    assert multiplier is None or 0.0 < multiplier <= 1.0
+    assert values_of(None) == (None, None, None)
+
+
+def test_spur_teeth_push_nothing_along_the_shafts(fleet, housing, tmp_path):
+    """Helix 0: no force along z with one-way coupling, so nothing there to compare; and no warning."""
+    text = fleet.path.read_text(encoding="utf-8")
+    (distance,) = re.findall(r"(?m)^centre_distance_mm.*$", text)
+    path = tmp_path / "fleet.toml"
+    path.write_text(text.replace(distance, "helix_angle_deg = 0"), encoding="utf-8")
+    spur = td.load_fleet(path).replaced({"model.gear_path": "structure", "operation.helix_angle_deg": (0.0, 4.0)})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        model = DriveModel(spur, housing=housing)
+        prediction = model.with_coupling(model.evaluate())
+        curves = prediction.coupling.curves
+        found = curves.differences(100.0, 600.0)
+        tables = predicted_tables(prediction, 700.0)
+    assert prediction.unit.geometry.helix_angle_rad == 0.0
+    assert np.abs(curves.bearing_force_n_per_um[0, :, 2]).max() < 1e-12 * curves.bearing_force_n_per_um[0].max()
+    assert [(one.gear, one.direction) for one in found] == [(g, d) for g in ("pinion", "wheel") for d in "xy"]
+    assert np.isnan(curves.difference_db[:, 2]).all()
+    assert np.isfinite(curves.difference_db[:, :2]).all()
+    assert tables["coupling"]["pinion_x_force_two_way_db"].notna().all()
+    one, two = prediction.coupling.conditions[2].dte_pp_m
+    assert one > 0.0 and two > 0.0

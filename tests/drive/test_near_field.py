@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import warnings
 
 import numpy as np
 import pytest
@@ -225,7 +226,7 @@ def test_patterns_are_alike_whatever_their_height():
     assert abs(alike[0, 2]) < 0.5
     assert alike.shape == (3, 3)
     silent = by_hand(lambda points: np.full(len(points), math.nan))
-    assert np.isnan(pattern_correlation([one, silent])).all()
+    assert np.isnan(pattern_correlation([one, silent])).tolist() == [[False, True], [True, True]]
     assert silent.highest("outside") is None
     assert silent.range_db("outside") is None
     assert silent.inside_path is None
@@ -316,3 +317,19 @@ def test_without_its_source_inside_only_the_walls_sound_there(free, cavity):
     outside = field.planes[0].plane.place == OUTSIDE
     assert shown[outside] == pytest.approx(field.planes[0].level_db["total"][outside], nan_ok=True)
     assert np.isfinite(shown[field.planes[0].plane.place == INSIDE]).all()
+
+
+def test_a_map_without_sound_has_no_correlation_and_leaves_the_others_theirs():
+    fields = [
+        by_hand(bump((0.0, 0.9, 0.0)), condition="1"),
+        by_hand(lambda points: np.full(len(points), -math.inf), condition="2"),
+        by_hand(bump((0.0, 0.9, 0.0), 60.0), condition="3"),
+        by_hand(lambda points: np.full(len(points), 70.0), condition="4"),
+    ]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = pattern_correlation(fields)
+        silent = pattern_correlation(fields[1:2])
+    assert found[0, 2] == pytest.approx(1.0, abs=1e-9)  # the same shape 40 dB down
+    assert np.isnan(found[[1, 3]]).all() and np.isnan(found[:, [1, 3]]).all()
+    assert silent.shape == (1, 1) and np.isnan(silent).all()

@@ -162,21 +162,17 @@ def test_keys_of_the_steps(fleet):
 
 
 def test_the_insertion_loss_over_frequency(fleet, housing):
-    """Lines, third octaves by energy, and the mass law; whatever the placement."""
+    """Whatever the placement; its bands, walls and losses are held in test_insertion_loss.py."""
     prediction = DriveModel(fleet, housing=housing)
     held = prediction.with_insertion_loss(prediction.evaluate()).insertion_loss
-    assert held.frequency_hz[0] == 50.0 and 690.0 < held.frequency_hz[-1] <= 700.0
-    assert np.diff(np.log2(held.frequency_hz)) == pytest.approx(np.full(len(held.frequency_hz) - 1, 1 / 48))
-    within = (held.frequency_hz >= 200.0 * 10**-0.05) & (held.frequency_hz < 199.526 * 10**0.05)
-    band = int(np.abs(held.band_hz - 199.526).argmin())
-    by_hand = -10.0 * math.log10(np.mean(10.0 ** (-0.1 * held.loss_db[within])))
-    assert held.band_db[band] == pytest.approx(by_hand, abs=0.4)  # a line at the edge may fall to either side
+    step = 10.0 ** (0.1 / 47)  # lines a third octave for the 0.01 of the air
+    assert 50.0 <= held.frequency_hz[0] < 50.0 * step and 700.0 / step < held.frequency_hz[-1] <= 700.0
+    assert np.diff(np.log(held.frequency_hz)) == pytest.approx(math.log(step))
     assert held.source_m == pytest.approx(tuple(np.add(housing.cavity.source_m, housing.body.position_m)))
     assert np.diff(held.mass_law_db).min() > 0.0
-    assert held.air.loss_factor == 0.01 and 0.0 < held.air.bare_walls < 0.01
     mesh = held.at_mesh[2]
     line = np.interp(mesh.frequency_hz, held.frequency_hz, held.loss_db)
-    assert mesh.loss_db == pytest.approx(line, abs=3.0)
+    assert mesh.loss_db == pytest.approx(line, abs=1.0)
     assert mesh.beside_db[0] <= mesh.loss_db <= mesh.beside_db[1]
 
 

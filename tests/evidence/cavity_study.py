@@ -42,7 +42,7 @@ FIELD_DEG = 78.0
 
 def source_files() -> list[Path]:
     """Modules that the figures come from."""
-    names = ("box", "coupling", "mass_law", "modes")
+    names = ("box", "box_modes", "coupling", "mass_law", "modes")
     return [*(PACKAGE / "cavity" / f"{name}.py" for name in names), HERE / "cavity_study.py"]
 
 

@@ -1,5 +1,6 @@
 """``[[sweep]]``, ``[[reference]]`` and ``[[feature]]`` in a fleet's file."""
 
+import dataclasses
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ from plain_fleets import plain_fleet
 
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import fleet_toml, load_fleet
+from tdacoustic.fleet.study_problems import check_studies
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -102,8 +104,24 @@ def one_reference(more):
         (one_sweep('"gear_dynamics.mass_kg.3" = [1.0]'), r"\[\[sweep\]\] 'one': gear_dynamics.mass_kg.3: "),
         (one_sweep('"masuda.constant_db" = [20, 20]'), r"parameters names 20 twice for 'masuda.constant_db'"),
         (one_sweep('"masuda.constant_db" = 20'), r"must have a list of values for 'masuda.constant_db', got 20"),
-        (one_sweep(""), r"parameters must be a table of lists"),
-        (one_sweep('"masuda.constant_db" = [1]', 'conditions = ["7"]'), r"there is no condition '7'; the nearest is"),
+        (one_sweep(""), r"parameters must name a key with a list of values, as .*, got an empty table"),
+        (one_sweep('"masuda.constant_db" = []'), r"must have a list of values for 'masuda.constant_db', got \[\]"),
+        (one_sweep('"masuda.constant_db" = [1, nan]'), r"must have finite values for 'masuda.constant_db', got nan"),
+        (one_sweep('"masuda.constant_db" = [1, -inf]'), r"must have finite values for 'masuda.constant_db', got -inf"),
+        (one_sweep('"gear_dynamics.mass_kg" = [[60, nan]]'), r"must have finite values for .*, got \[60, nan\]"),
+        (one_sweep('"masuda.constant_db" = [1, true]'),
+         r"\[\[sweep\]\] 'one': parameters must have numbers for 'masuda.constant_db', got true"),
+        (one_sweep('"gear_dynamics.mass_kg.1" = ["60", 70, "x"]'), r"must have numbers for .*, got '60', 'x'"),
+        (one_sweep('"gear_dynamics.mass_kg" = [[60, "x"]]'), r"must have numbers for .*, got \[60, 'x'\]"),
+        (one_sweep('"masuda.weighting" = ["A", 1]'), r"must have words for 'masuda.weighting', got 1"),
+        (one_sweep('"masuda.weighting" = ["A", "B"]'), r"\[masuda\]: weighting must be one of Z, A, got 'B'"),
+        (one_sweep('"radiation.air_absorption" = [true, 1]'), r"must have true or false for .*, got 1"),
+        (one_sweep('"masuda.constant_db" = [1], masuda.constant_db = [2]'), r"'masuda.constant_db' twice, with and"),
+        (one_sweep('"masuda.constant_db" = [1]', 'conditions = ["1", 1]'), r"conditions names '1' twice"),
+        (one_sweep('"masuda.constant_db" = [1]', 'conditions = ["7"]'),
+         r"there is no condition '7'; the nearest is .*; there are 1, 2"),
+        (one_sweep('"masuda.constant_db" = [1]', 'conditions = ["1", "7", "x"]'),
+         r"there is no condition '7', 'x'; there are 1, 2, 3, 4, 5, 6"),
         (one_sweep('"masuda.constant_db" = [1]') + one_sweep('"masuda.constant_db" = [2]'),
          r"\[\[sweep\]\]: the name 'one' stands twice"),
         (one_sweep('"masuda.constant_db" = [1]', 'condition = ["1"]'), r"unknown key 'condition' in \[\[sweep\]\]"),
@@ -117,6 +135,18 @@ def one_reference(more):
         (one_feature('shape = "rise"'), r"shape must be one of rises, falls"),
         (one_feature('shape = "highest_at"'), r"shape = 'highest_at' needs at"),
         (one_feature('shape = "rises"\nat = ["1"]'), r"shape = 'rises' has no use for at"),
+        (one_feature('shape = "rises"\nat = ["1"]\nvalue = 3'), r"shape = 'rises' has no use for at and value"),
+        (one_feature('shape = "above"\nvalue = 3'), r"shape = 'above' needs than and has no use for value"),
+        (one_feature('shape = "highest_at"\nat = ["1", "2", "3", "4", "5", "6"]'),
+         r"at names all conditions, so that nothing is said: leave out where the highest value is not"),
+        (one_feature('shape = "lowest_at"\nover = "helix"\nat = [0.1, 4, 8, 12]'), r"at names all helix angles"),
+        (one_feature('shape = "highest_at"\nat = ["8", "1", "9"]'), r"there is no condition '8', '9'; there are 1, "),
+        (one_feature('shape = "highest_at"\nover = "helix"\nat = [8.5, 4, 9]'), r"there is no helix angle 8.5°, 9°"),
+        (one_feature('shape = "span"\nvalue = -10'), r"value must be > 0 for shape = 'span', got -10"),
+        (one_feature('shape = "above"\nthan = ["mesh_spl_4m_db", "mesh_spl_4m_db"]'), r"'mesh_spl_4m_db' twice"),
+        (one_feature('shape = "span"\nvalue = nan'), r"value must be .*, got nan"),
+        (one_reference('quantity = "spl_4m_db"\ncondition = "1"\nvalue = 1') * 2,
+         r"\[\[reference\]\] 2: says the same as \[\[reference\]\] 1"),
         (one_feature('shape = "highest_at"\nat = ["1", "1"]'), r"names '1' twice"),
         (one_feature('shape = "highest_at"\nat = ["8"]'), r"there is no condition '8'"),
         (one_feature('shape = "highest_at"\nover = "helix"\nat = [8.5]'), r"there is no helix angle 8.5°"),
@@ -131,6 +161,29 @@ def one_reference(more):
 def test_what_is_wrong_is_named(load, more, message):
     with pytest.raises(FleetError, match=message):
         load(more)
+
+
+def test_keys_of_a_sweep_without_quotes_mean_the_same(load):
+    quoted = load(one_sweep('"masuda.constant_db" = [20, 30], "gear_dynamics.mass_kg.2" = [280, 300]'))
+    assert load(one_sweep("masuda.constant_db = [20, 30], gear_dynamics.mass_kg.2 = [280, 300]")).sweep == quoted.sweep
+
+
+def test_a_number_for_a_table_and_a_number_out_of_range_are_points(load):
+    both = '"gear_pair.1.transmission_error_um" = [5, [5, 1]], "gear_dynamics.mesh_damping_ratio" = [2]'
+    assert load(one_sweep(both)).sweep[0].n_points == 2
+
+
+def test_conditions_that_a_campaign_names_are_checked_against_it(load):
+    text = one_sweep('"masuda.constant_db" = [1]', 'conditions = ["slow", "fast"]')
+    fleet = load(text.replace("slow", "1").replace("fast", "2"))
+    check_studies(fleet, ["a"])  # its own [operation] was held against them when it was read
+    bare = dataclasses.replace(fleet, operation=fleet.operation.model_copy(update={"train_speed_km_h": None}))
+    if bare.operation.names:
+        bare = dataclasses.replace(bare, operation=bare.operation.model_copy(update={"condition_names": None}))
+    assert not bare.operation.names
+    check_studies(bare, ["1", "2", "3"])
+    with pytest.raises(FleetError, match=r"\[\[sweep\]\] 'one': there is no condition '2'; the nearest is '3'"):
+        check_studies(dataclasses.replace(bare, reference=(), feature=()), ["1", "3"])
 
 
 def test_too_many_points_are_refused_with_their_number(load):

@@ -59,7 +59,12 @@ def test_a_changed_fleet_keeps_its_cases(fleet_with):
     ("text", "message"),
     [
         ("", "[[what_if]] 'quiet': names no change: motor_db, structure_db, mesh_db or parameters is needed"),
-        ("parameters = {}", "names no change"),
+        ("parameters = {}", "parameters must name a key with its new value"),
+        ("motor_db = -1\nparameters = {}", "got an empty table; leave it out where no parameter changes"),
+        (
+            'parameters = { "masuda.constant_db" = 1, masuda.constant_db = 2 }',
+            "parameters names 'masuda.constant_db' twice, with and without quotes",
+        ),
         (
             "motor_db = nan",
             "[[what_if]] 'quiet': motor_db must be a change in dB, below 0 for quieter, or \"off\", got nan",

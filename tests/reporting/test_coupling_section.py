@@ -108,3 +108,19 @@ def test_one_condition_makes_a_whole_sentence(results):
     said = words([coupling_section(replace(result, prediction=replace(result.prediction, coupling=alone)))])
     assert "in condition 1 with two-way coupling." in said
     assert "Between 20 Hz and 700 Hz" in said.replace(".0 Hz", " Hz")
+
+
+def test_levels_that_do_not_change_have_no_signed_nothing(results):
+    result = results["one_way"]
+    coupling = result.prediction.coupling
+    same = [replace(held, total_db=(80.0, 80.0 - 0.01 * n)) for n, held in enumerate(coupling.conditions[:3])]
+
+    def of(*conditions):
+        held = replace(coupling, conditions=conditions)
+        return words([coupling_section(replace(result, prediction=replace(result.prediction, coupling=held)))])
+
+    assert "The total at 4 m does not change with two-way coupling (less than 0.05 dB)." in of(*same)
+    assert "The total at 4 m does not change in condition 1 with two-way coupling" in of(same[0])
+    louder = replace(same[2], total_db=(80.0, 81.0))
+    text = of(*same[:2], louder)
+    assert "The total at 4 m changes by 0.0 dB (condition 2) to +1.0 dB (condition 3) with two-way coupling." in text

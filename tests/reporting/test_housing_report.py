@@ -13,7 +13,17 @@ from plain_fleets import plain_fleet
 from tdacoustic.drive import DriveModel, HousingFacts, LevelAt, StructureSource
 from tdacoustic.fleet import load_fleet
 from tdacoustic.radiation import overall_level_db
-from tdacoustic.reporting.document import Details, Facts, FigureBlock, Paragraph, Section, Sentences, Table, walk
+from tdacoustic.reporting.document import (
+    Details,
+    Facts,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+    walk,
+)
 from tdacoustic.reporting.figure import Line, Markers, Rule
 from tdacoustic.reporting.html import render_html
 from tdacoustic.reporting.predicted_report import predicted_report
@@ -337,6 +347,22 @@ def test_a_drive_as_loud_all_around_has_no_section_on_directions(result):
     flat = tuple(dataclasses.replace(c, level_db=np.full(72, 90.0)) for c in result.prediction.directivity)
     prediction = dataclasses.replace(result.prediction, directivity=flat)
     assert "directivity" not in sections(predicted_report(dataclasses.replace(result, prediction=prediction)))
+
+
+def test_a_circle_in_a_node_plane_is_said_where_the_circle_is_shown(result):
+    def said(prediction):
+        made = dataclasses.replace(result, prediction=prediction)
+        (section,) = [one for one in predicted_report(made).sections if one.id == "directivity"]
+        return [block.text for block in section.blocks if isinstance(block, Notice)]
+
+    first, *others = result.prediction.directivity
+    (level_db,) = [one.level_db(result.prediction.surface) for one in result.prediction.sound[:1]]
+    lower = np.where(np.arange(72) < 36, level_db - 30.0, level_db - 40.0)
+    circles = (dataclasses.replace(first, level_db=lower), *others)
+    before = said(result.prediction)
+    after = said(dataclasses.replace(result.prediction, directivity=circles))
+    assert not any(" 1 (" in text for text in before)
+    assert any(" 1 (" in text and "lies in a node plane of the sound" in text for text in after)
 
 
 def test_one_that_is_round_among_others_has_no_angle_of_its_loudest(result):

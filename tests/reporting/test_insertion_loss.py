@@ -91,15 +91,6 @@ def test_what_it_says(section):
     assert "bare walls alone would give a loss factor of 0.001" in said
 
 
-def test_it_is_held_against_the_rough_estimate_of_the_papers_drive(section, tmp_path):
-    said = words(section)
-    assert "20 dB at 175 Hz, 26 dB at 350 Hz, 30 dB at 525 Hz and 13 dB at 1001 Hz, give or take 10 dB" in said
-    assert "is met in conditions 3 and 5 and is missed by +27 dB in condition 1;" in said
-    reference = load_fleet(plain_fleet("reference-drive"))
-    if not any("paper" in parameter.origin for parameter in reference.parameters() if "gear_pair" in parameter.key):
-        assert "rough" not in words(insertion_loss_section(made()))
-
-
 @pytest.mark.parametrize(
     ("placement", "said"),
     [

@@ -68,11 +68,14 @@ def test_where_the_highest_levels_are_and_what_the_paper_has(prediction):
     assert "the highest level outside is 100.0 dB at x 0, y 0.5, z 0 m, between the motor and the housing; " in text
     assert "the highest level inside is 148.0 dB at x 0, y 0.1, z 0 m." in text
     assert "inside it is louder than anywhere outside in condition 5." in text
+    assert "Condition 5, as the maps show it: outside " in text
+    assert "dB at the darkest point; inside it is up to 48 dB above the brightest outside." in text
     text = said(near_field_section(result_with(prediction, outside_alone(by_hand(bump(BETWEEN), condition="5")))))
     assert "the highest level outside is 100.0 dB at x 0, y 0.5, z 0 m, between the motor and the housing." in text
     assert "here the highest level outside lies between them in condition 5." in text
     assert "above the housing's top" not in text
     assert "inside it is" not in text
+    assert "dB at the darkest point." in text
 
 
 def test_another_place_is_said_as_such(prediction):

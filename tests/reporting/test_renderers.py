@@ -2,6 +2,7 @@
 
 import json
 import os
+import struct
 import subprocess
 import sys
 
@@ -10,9 +11,14 @@ import pytest
 from report_figures import EVIL, every_figure, heatmap, spectrum
 
 from tdacoustic.reporting import Axis, Figure, Heatmap, Line, Markers, ReportError, plot
+from tdacoustic.reporting.document import Document, FigureBlock, Section
+from tdacoustic.reporting.figure import Bars
+from tdacoustic.reporting.html import render_html
+from tdacoustic.reporting.layout import COLUMN_WIDTH, figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png, render_svg
 from tdacoustic.reporting.palette import DARK, LIGHT
-from tdacoustic.reporting.plotly_renderer import MAX_COLUMNS, MAX_POINTS, MAX_ROWS, render_plotly
+from tdacoustic.reporting.plotly_renderer import MAX_POINTS, render_plotly
+from tdacoustic.reporting.plotly_traces import MAX_COLUMNS, MAX_ROWS
 
 FIGURES = pytest.mark.parametrize("figure", every_figure(), ids=lambda figure: figure.name)
 
@@ -113,3 +119,32 @@ def test_drawing_leaves_no_global_state_and_imports_are_light() -> None:
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     subprocess.run([sys.executable, "-c", code], check=True, timeout=120, env=environment)
+
+
+def test_a_map_with_equal_axes_is_as_wide_as_it_needs() -> None:
+    """A square map of 460 pixels in height: the plot is 370 wide, with axis and scale some 550; not the whole 900."""
+    edges = np.linspace(-1.5, 1.5, 31)
+    x, y = Axis("x", "m", limits=(-1.5, 1.5)), Axis("y", "m", limits=(-1.5, 1.5))
+    heat = Heatmap(edges, edges, np.add.outer(edges, edges), "level", Axis("Level", "dB"))
+    square = Figure("map", "Map", "", x, y, [heat], height=460, equal=True)
+    assert 500 <= figure_width(square) <= 600
+    wide, high = struct.unpack(">II", render_png(square, dpi=100)[16:24])
+    assert wide / high == pytest.approx(figure_width(square) / 460, rel=0.01)
+    assert f"max-width: {figure_width(square)}px" in page_of(square)
+    free = Figure("map", "Map", "", x, y, [heat], height=460)
+    assert figure_width(free) == COLUMN_WIDTH
+    assert "max-width: " not in page_of(free).split("<main")[1].split("<script")[0]
+
+
+def page_of(figure: Figure) -> str:
+    return render_html(Document("Report", "", "measured", sections=[Section("one", "One", [FigureBlock(figure)])]))
+
+
+def test_many_long_categories_are_broken_into_lines() -> None:
+    names = [f"a long name of a parameter {number}" for number in range(8)]
+    bars = Figure("b", "B", "", Axis("Parameter"), Axis("Change", "dB"), [Bars(names, np.ones(8), "one")])
+    axis = render_plotly(bars)["layout"]["xaxis"]
+    assert axis["tickangle"] == 0
+    assert axis["ticktext"][3].replace("<br>", " ") == names[3] and "<br>" in axis["ticktext"][3]
+    few = Figure("b", "B", "", Axis("Parameter"), Axis("Change", "dB"), [Bars(names[:2], np.ones(2), "one")])
+    assert "tickangle" not in render_plotly(few)["layout"]["xaxis"]

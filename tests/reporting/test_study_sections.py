@@ -12,6 +12,7 @@ from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.predicted_report import predicted_report
 from tdacoustic.reporting.sections.design_sweeps import design_sweeps
 from tdacoustic.reporting.sections.directivity import directivity
+from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.paper_features import features_words, paper_features
 from tdacoustic.reporting.sections.sensitivity import sensitivity
 from tdacoustic.reporting.sections.words import slug
@@ -69,6 +70,10 @@ def result(tmp_path_factory):
     return td.predict(path, folder / "store")
 
 
+def _summary(result):
+    return [item for block in predicted_report(result).summary if isinstance(block, Sentences) for item in block.items]
+
+
 def parts(section, kind):
     return [block for block in walk([section]) if isinstance(block, kind)]
 
@@ -89,7 +94,9 @@ def test_the_tables_say_what_the_studies_found(result):
     assert features.loc["Silent", "verdict"] == "not determined"
     assert math.isnan(features.loc["Silent", "margin"])
     assert features.loc["Level over speed", "verdict"] != features.loc["Level over speed rises", "verdict"]
+    assert set(features["margin_unit"]) == {"dB"}
     references = result.tables["references"]
+    assert references[["unit", "difference_unit"]].to_numpy().tolist() == [["dB", "dB"]] * 2
     assert (references["model_value"] - references["reference_value"]).tolist() == pytest.approx(
         references["difference"].tolist()
     )
@@ -122,7 +129,10 @@ def test_the_section_on_features(result):
     ]
     (figure,) = parts(section, FigureBlock)
     assert {element.name for element in figure.figure.elements} >= {"this model", "printed, measured"}
-    assert "Level over speed" in features_words(result)
+    words = features_words(result)
+    assert words.startswith("of 3 features of the paper 1 is reproduced, 1 is not, and 1 cannot be said; not ")
+    assert words.endswith("not determined: Silent")
+    assert any(text == sentence(words) for text in _summary(result))
 
 
 def test_the_section_on_design_sweeps(result):
@@ -134,6 +144,8 @@ def test_the_section_on_design_sweeps(result):
     assert [line.name for line in lines.elements] == ["condition 1", "condition 6"]
     assert heat.elements[0].x.tolist() == [1000.0, 3000.0, 6000.0]  # sorted, whatever the file's order
     rows = rows_of(section, "sweep-damping-and-torque-points")
+    assert "each condition has a scale of its own" in heat.caption
+    assert any("is operation.torque_n_m." in block.text for block in parts(section, Paragraph))
     z = heat.elements[0].z
     assert z[0].tolist() == pytest.approx([rows[2]["condition_5"], rows[0]["condition_5"], rows[1]["condition_5"]])
 
@@ -143,7 +155,14 @@ def test_the_section_on_sensitivities(result):
     (figure,) = parts(section, FigureBlock)
     assert len(figure.figure.categories) <= 10
     rows = rows_of(section, "sensitivity-total")
-    assert "masuda.constant_db" in {row["parameter"] for row in rows}
+    by_key = {row["parameter"]: row for row in rows}
+    assert by_key["masuda.constant_db"]["words"] == "Masuda constant"
+    assert by_key["gear_pair.1.face_width_mm"]["value"] == "120 mm"
+    assert by_key["gear_pair.1.profile_shift.2"]["value"] == "\N{MINUS SIGN}0.59026"
+    (whole,) = [block for block in parts(section, Table) if block.name == "sensitivity-total"]
+    titles = [column.title for column in whole.columns]
+    assert titles[4] == "Condition 1" and "Helix 12°" in titles
+    assert any(block.text.startswith("Slopes of the level at 4 m") for block in parts(section, Paragraph))
     assert {block.summary for block in parts(section, Details)} >= {"Parameters not varied"}
 
 

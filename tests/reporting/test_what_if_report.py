@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from plain_fleets import plain_fleet
 
-from tdacoustic.drive.what_if import IntervalBasis, WhatIfAnswer, WhatIfLevel
-from tdacoustic.fleet import WhatIf
+from tdacoustic.drive.what_if import IntervalBasis, WhatIfAnswer, WhatIfLevel, most_off_db
+from tdacoustic.fleet import WhatIf, load_fleet
 from tdacoustic.reporting.document import Document, FigureBlock, Notice, Paragraph, Sentences, Table, walk
 from tdacoustic.reporting.figure import Axis, Bars, Figure, ReportError
 from tdacoustic.reporting.html import render_html
@@ -15,6 +16,7 @@ from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.plotly_renderer import render_plotly
 from tdacoustic.reporting.sections.what_if import what_if_line, what_if_section
 
+FLEET = load_fleet(plain_fleet("reference-drive"))
 STEPS = {"10 dB less": -10, "3 dB less": -3, "off": "off"}
 USUAL = tuple(
     WhatIf.model_validate({"name": f"{path} {step}", f"{path}_db": change})
@@ -54,7 +56,7 @@ def said(section, start):
 
 
 def test_a_sentence_a_speed_without_intervals(answer):
-    section = what_if_section(answer)
+    section = what_if_section(answer, FLEET)
     assert said(section, "Condition b") == (
         "Condition b (20 km/h), 85.0 dB at 4 m: 10 dB less from the motor takes 5.3 dB off, 6.7 dB if it were silent; "
         "10 dB less from the meshing noise takes 0.9 dB off, 1.0 dB if it were silent."
@@ -75,7 +77,7 @@ def test_intervals_in_brackets_and_what_they_hold(answer):
         "mesh 10 dB less": (-6.0, 0.0),
     }
     calibrated = replace(answer, levels=usual("b", 20.0, (-5.3, -2.2, -6.7), (-0.9, -0.5, -1.0), ends), basis=BASIS)
-    section = what_if_section(calibrated)
+    section = what_if_section(calibrated, FLEET)
     text = said(section, "Condition b")
     assert "from the motor takes 5.3 dB (0.7 to 9.7) off, 6.7 dB if it were silent" in text
     assert "from the meshing noise takes 0.9 dB (0.0 to 6.0) off" in text
@@ -83,17 +85,56 @@ def test_intervals_in_brackets_and_what_they_hold(answer):
         "; in condition b the intervals overlap, and which source to begin with is not decided."
     )
     basis = said(section, "In brackets: intervals of 95 %")
-    assert "the range over all values of masuda.constant_db that the data allow (profile likelihood)" in basis
+    assert (
+        "the range over all values of Masuda constant (masuda.constant_db) that the data allow (profile likelihood)"
+        in basis
+    )
     assert "the model's scatter of 4 dB as an error of each source by itself in each condition [assumed]" in basis
     assert what_if_line(calibrated).startswith(
-        "What if (level at 4 m): at 20 km/h 10 dB less from the motor takes 5.3 dB (0.7 to 9.7) off"
+        "What if (the model's level at 4 m): at 20 km/h 10 dB less from the motor takes 5.3 dB (0.7 to 9.7) off"
     )
+
+
+def test_a_source_that_is_silent_has_an_interval_and_little_is_little_only_where_that_says_so(answer):
+    ends = {
+        "motor off": (-20.0, -0.9),
+        "mesh off": (-8.7, 0.0),
+    }
+    sure = {"motor off": (-0.8, -0.1)}
+    held = (
+        *usual("b", 20.0, (-5.3, -2.2, -6.7), (-0.5, -0.2, -0.7), ends),
+        *usual("a", 60.0, (-0.4, -0.2, -0.5), (-8.0, -2.7, -12.0), sure),
+    )
+    section = what_if_section(replace(answer, levels=held, basis=BASIS), FLEET)
+    assert "takes 5.3 dB off, 6.7 dB (0.9 to 20.0) if it were silent" in said(section, "Condition b")
+    assert [text for text in words(section) if text.startswith("Left out")] == [
+        "Left out altogether, less than 1 dB is gained from the motor in condition a: others come first.",
+        "Left out altogether, less than 1 dB is gained from the meshing noise in condition b by the fitted values, but "
+        "up to 8.7 dB by the intervals.",
+    ]
+
+
+def test_what_of_a_recorded_level_can_change(answer):
+    bare = "The model has lines alone: a recorded level, with broadband sound in it, changes by less."
+    assert bare in words(what_if_section(answer, FLEET))
+    assert what_if_line(answer).endswith(f". {bare}")
+    recorded = replace(answer, line_fractions=(("b", 0.06), ("a", 0.16)))  # 10 lg(1 - 0.06) and 10 lg(1 - 0.16)
+    assert what_if_line(recorded).endswith(
+        ". The model has lines alone, which are 6 to 16 % of the recorded sound energy: as long as the rest stays, the "
+        "recorded level falls by 0.3 to 0.8 dB at most, depending on the condition."
+    )
+    assert most_off_db(0.5) == pytest.approx(3.01, abs=0.01)
+    assert what_if_line(replace(answer, line_fractions=(("a", 1.0),))).endswith("100 % of the recorded sound energy.")
 
 
 def test_an_undetermined_parameter_is_a_warning(answer):
     basis = replace(BASIS, open_parameters=("masuda.constant_db", "model.motor_gain_db"))
-    section = what_if_section(replace(answer, basis=basis))
-    assert said(section, "The data do not determine masuda.constant_db and model.motor_gain_db: their bounds hold")
+    section = what_if_section(replace(answer, basis=basis), FLEET)
+    assert said(
+        section,
+        "The data do not determine Masuda constant (masuda.constant_db) and motor gain (model.motor_gain_db): their "
+        "bounds hold",
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,6 +146,9 @@ def test_an_undetermined_parameter_is_a_warning(answer):
         (-0.2, (-1.0, 0.5), "changes it by \N{MINUS SIGN}0.2 dB (\N{MINUS SIGN}1.0 to +0.5)"),
         (0.0, None, "changes nothing"),
         (0.0, (-3.0, 0.0), "takes 0.0 dB (0.0 to 3.0) off"),
+        (0.0, (0.0, 0.0), "changes nothing"),
+        (0.01, (-0.02, 0.03), "changes nothing"),
+        (-0.01, (-0.06, 0.06), "changes it by 0.0 dB (\N{MINUS SIGN}0.1 to +0.1)"),
         (-10.0, (-10.0, -10.0), "takes 10.0 dB off"),
         (None, None, "leaves nothing that sounds"),
     ],
@@ -115,14 +159,16 @@ def test_words_of_a_change(change_db, ends, expected):
         "4 m", ("motor",), (case,), False, (level("1", "case", change_db, ends),), BASIS if ends else None
     )
     assert f"\N{LEFT DOUBLE QUOTATION MARK}case\N{RIGHT DOUBLE QUOTATION MARK} {expected}." in said(
-        what_if_section(one), "Condition 1"
+        what_if_section(one, FLEET), "Condition 1"
     )
 
 
 def test_a_source_that_alone_sounds(answer):
     alone = usual("c", 114.0, (0.0, 0.0, 0.0), (-10.0, -3.0, None))
-    text = said(what_if_section(replace(answer, levels=(*answer.levels, *alone))), "Condition c")
-    assert text.endswith("the meshing noise is all that sounds, each decibel less of it is one less at 4 m.")
+    text = said(what_if_section(replace(answer, levels=(*answer.levels, *alone)), FLEET), "Condition c")
+    assert text.endswith(
+        "the meshing noise is all that sounds in the model, each decibel less of it is one less at 4 m."
+    )
 
 
 def test_stated_cases_are_named_with_what_they_change(answer):
@@ -132,25 +178,25 @@ def test_stated_cases_are_named_with_what_they_change(answer):
         WhatIf(name="b", parameters=parameters, conditions=("1", "2")),
     )
     held = (level("1", "a", -5.0), level("1", "b", 1.0))
-    text = said(what_if_section(replace(answer, cases=cases, assumed=False, levels=held)), "The cases are")
+    text = said(what_if_section(replace(answer, cases=cases, assumed=False, levels=held), FLEET), "The cases are")
     assert text.replace("\N{LEFT DOUBLE QUOTATION MARK}", "'").replace("\N{RIGHT DOUBLE QUOTATION MARK}", "'") == (
         "The cases are those of the fleet's [[what_if]]: 'a' (motor \N{MINUS SIGN}5 dB, mesh off) and 'b' "
-        "(gear_dynamics.mesh_damping_ratio = 0.2, gear_pair.1.transmission_error_um = [3, 1], in conditions 1 and 2 "
-        "only)."
+        "(mesh damping ratio (gear_dynamics.mesh_damping_ratio) = 0.2, transmission error "
+        "(gear_pair.1.transmission_error_um) = [3, 1] µm, in conditions 1 and 2 only)."
     )
 
 
 def test_many_cases_are_in_the_table(answer):
     cases = tuple(WhatIf(name=f"case {n}", motor_db=-n) for n in range(1, 9))
     levels = tuple(level("1", case.name, -0.1 * n) for n, case in enumerate(cases, 1))
-    section = what_if_section(replace(answer, cases=cases, assumed=False, levels=levels))
+    section = what_if_section(replace(answer, cases=cases, assumed=False, levels=levels), FLEET)
     assert said(section, "Condition 1").endswith("; more in the table.")
     (surface,) = [b for b in walk([section]) if isinstance(b, Table) and b.name == "what-if-surface"]
     assert len(surface.rows) == 8
 
 
 def test_a_silent_drive_has_no_section():
-    assert what_if_section(WhatIfAnswer("4 m", (), (), True, ())) is None
+    assert what_if_section(WhatIfAnswer("4 m", (), (), True, ()), FLEET) is None
     assert what_if_line(None) == ""
 
 
@@ -158,7 +204,7 @@ def test_names_are_escaped():
     hostile = '<script>alert("x")</script>'
     case = WhatIf.model_construct(name=hostile, motor_db=-1.0, conditions=None, parameters=())
     held = (level(hostile, hostile, -1.0), level(hostile, hostile, -1.0, receiver=hostile))
-    section = what_if_section(WhatIfAnswer("4 m", ("motor",), (case,), False, held))
+    section = what_if_section(WhatIfAnswer("4 m", ("motor",), (case,), False, held), FLEET)
     page = render_html(Document("t", "s", "calculated", sections=[section]))
     assert "<script>alert" not in page
     assert "&lt;script&gt;alert" in page
@@ -167,7 +213,7 @@ def test_names_are_escaped():
 def test_the_figure_has_bars_with_both_lengths_and_marks(answer):
     ends = {"motor 10 dB less": (-9.7, -0.7), "mesh 10 dB less": (-6.0, 0.0)}
     calibrated = replace(answer, levels=usual("b", 20.0, (-5.3, -2.2, -6.7), (-0.9, -0.5, -1.0), ends), basis=BASIS)
-    (figure,) = [b.figure for b in walk([what_if_section(calibrated)]) if isinstance(b, FigureBlock)]
+    (figure,) = [b.figure for b in walk([what_if_section(calibrated, FLEET)]) if isinstance(b, FigureBlock)]
     bar = figure.elements[0]
     assert isinstance(bar, Bars)
     assert bar.values.tolist() == pytest.approx([5.3])

@@ -5,14 +5,17 @@ import math
 
 import numpy as np
 import pytest
-from made_up_modes import fleet_text, sound_of_made_up_modes
+from made_up_modes import air_of_made_up_modes, fleet_text, sound_of_made_up_modes
 from plain_fleets import plain_fleet
 
 from tdacoustic.drive import DriveModel, conditions_of
 from tdacoustic.drive.housing_steps import housing_tasks
+from tdacoustic.drive.what_if import changed_fleet, changed_model, what_if_answer
 from tdacoustic.errors import FleetError
-from tdacoustic.fleet import load_fleet
+from tdacoustic.fleet import WhatIf, load_fleet
+from tdacoustic.radiation import absorption_db_per_m
 from tdacoustic.studies import QUANTITIES, CaseModel, conditions_under
+from tdacoustic.studies.changed_fleet import housing_signature, housing_under
 
 MOTOR = """
 [motor]
@@ -80,6 +83,8 @@ def same(values, fleet, housing=None):
         {"housing.seat.1.position_m.2": 0.03},  # the gear between its bearings: their shares of its force
         {"motor.carrier_hz": 250.0},
         {"masuda.weighting": "A"},
+        {"radiation.air_absorption": True},
+        {"radiation.air_absorption": True, "masuda.constant_db": 12.0},
         {"model.coupling": "two_way"},
         {"model.coupling": "two_way", "housing.loss_factor": 0.2},
     ],
@@ -145,3 +150,75 @@ def test_conditions_follow_the_fleet_where_they_followed_it_before(reference):
     smaller = reference.replaced({"train.wheel_diameter_mm": 500.0})
     fast = dataclasses.replace(measured[0], motor_hz=7.0)  # a tacho's, not of the wheel
     assert [one.motor_hz for one in conditions_under(reference, smaller, (fast,))] == [7.0]
+
+
+def test_what_the_air_absorbs_is_in_the_values():
+    """Over 400 m it takes what the drive model says it takes, from each case by its own frequency."""
+    plain = load_fleet(plain_fleet("reference-drive")).replaced({"radiation.sphere_radius_m": 400.0})
+    absorbing = plain.replaced({"radiation.air_absorption": True})
+    level = QUANTITIES.index("mesh_spl_4m_db")
+    held, other = (CaseModel(fleet, None, conditions_of(fleet)) for fleet in (plain, absorbing))
+    same(other.base, absorbing)
+    same(held.values(absorbing), absorbing)
+    same(other.values(plain), plain)
+    taken = held.base.values[:, level] - other.base.values[:, level]
+    hz = held.base.values[:, QUANTITIES.index("mesh_frequency_hz")]
+    wanted = 400.0 * absorption_db_per_m(hz, 273.15 + 20.0, absorbing.radiation.humidity_percent.value)
+    assert taken == pytest.approx(wanted, rel=1e-9)
+    assert wanted.max() > 1.0
+
+
+# ------------------------------------------------------------------ gears that move along their shafts
+
+MOVED = {"housing.seat.1.position_m.2": 0.02}
+
+
+@pytest.fixture(scope="module")
+def aired(housed):
+    """The small fleet with Masuda's source inside, and the air around it."""
+    fleet = housed[0].replaced({"masuda.placement": "inside", "model.gear_path": "masuda"})
+    return fleet, air_of_made_up_modes(fleet, sound_of_made_up_modes(fleet))
+
+
+def test_the_source_inside_moves_with_its_gear(aired):
+    """It stands where the pinion does: another place of the pinion takes air with the source there."""
+    fleet, housing = aired
+    moved = fleet.replaced(MOVED)
+    assert housing_signature(moved) != housing_signature(fleet)
+    assert housing_under(fleet, moved, housing) is None
+    assert CaseModel(fleet, housing, conditions_of(fleet)).needs_vectors(moved)
+    own = air_of_made_up_modes(moved, sound_of_made_up_modes(moved))
+    assert housing.inside.source_m[1] == pytest.approx(0.0)
+    assert own.inside.source_m == pytest.approx((housing.inside.source_m[0], 0.02, housing.inside.source_m[2]))
+    levels = [
+        CaseModel(of, sound, conditions_of(of)).base.values[:5, QUANTITIES.index("mesh_spl_4m_db")]
+        for of, sound in ((fleet, housing), (moved, own))
+    ]
+    assert np.abs(levels[1] - levels[0]).max() > 0.01
+    told = moved.replaced({"masuda.position_m": (0.0, 0.0, 0.0)})
+    assert housing_signature(told) == housing_signature(told.replaced({"housing.seat.1.position_m.2": 0.0}))
+
+
+def test_a_free_source_stays_and_its_gear_moves(housed):
+    fleet, housing = housed
+    moved = fleet.replaced(MOVED)
+    found = housing_under(fleet, moved, housing)
+    assert found.box.seats[0].gear_y_m == pytest.approx(0.02)
+    assert found.points is housing.points
+
+
+def test_a_what_if_with_another_place_of_the_gear_has_the_source_there(aired):
+    """As a new prediction of the changed fleet has it."""
+    fleet, housing = aired
+    case = WhatIf(name="further left", parameters=tuple(MOVED.items()))
+    asked = dataclasses.replace(fleet, what_if=(case,))
+    moved = changed_fleet(asked, case)
+    own = air_of_made_up_modes(moved, sound_of_made_up_modes(moved))
+    model, other = DriveModel(asked, housing=housing), changed_model(asked, case, own)
+    conditions = model.conditions[:5]
+    sounds = [model.sound_of(model.gears(condition)) for condition in conditions]
+    answer = what_if_answer(model, conditions, sounds, (), {case.name: other})
+    expected = DriveModel(moved, housing=own).evaluate(conditions)
+    for level in answer.levels:
+        assert level.level_db == expected.sound_of(level.condition).level_db("4 m", "total", level.weighting)
+    assert max(abs(level.change_db) for level in answer.levels) > 0.01

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from tdacoustic.drive import conditions_of
-from tdacoustic.studies import PATHS, sensitivity_of
+from tdacoustic.drive import DriveModel, conditions_of
+from tdacoustic.radiation import absorption_db_per_m
+from tdacoustic.studies import PATHS, QUANTITIES, sensitivity_of
 from tdacoustic.studies.responses import SCAN_FACTORS, SILENT, _responses, bare_fleet, fleet_of, responses_task
 from tdacoustic.studies.sensitivity import change_for
 
@@ -112,3 +113,20 @@ def test_the_fleet_of_a_step_is_the_fleet_without_what_it_does_not_depend_on(ref
     renamed = reference.replaced({})
     object.__setattr__(renamed, "name", "another")
     assert bare_fleet(renamed) == text
+
+
+def test_the_air_takes_its_part_of_the_responses(reference):
+    """400 m away the humidity, whose absorption no other number shows, has a sensitivity of its own."""
+    far = reference.replaced({"radiation.sphere_radius_m": 400.0})
+    absorbing = far.replaced({"radiation.air_absorption": True})
+    responses, sensitivity = found(absorbing)
+    level = QUANTITIES.index("mesh_spl_4m_db")
+    prediction = DriveModel(absorbing).evaluate()
+    told = [sound.level_db(prediction.surface, "mesh") for sound in prediction.sound[:2]]
+    assert responses.base[:2, level] == pytest.approx(told, rel=1e-9)
+    told = [prediction.conditions[place].mesh_hz for place in (0, 1)]
+    air, humidity = absorbing.number("radiation.temperature_degc"), absorbing.radiation.humidity_percent.value
+    ends = [400.0 * absorption_db_per_m(told, air, part * humidity) for part in (0.99, 1.01)]
+    wanted = (ends[0] - ends[1]) / 0.02 * 0.1  # the derivative, for 10 %
+    assert changes(sensitivity, "radiation.humidity_percent", "mesh")[:2] == pytest.approx(wanted, rel=1e-3)
+    assert "radiation.humidity_percent" in {left.key for left in found(far)[0].left_out}

@@ -8,8 +8,8 @@ from made_up_modes import fleet_text
 import tdacoustic as td
 from tdacoustic.campaign import load_campaign
 from tdacoustic.errors import FittingError
+from tdacoustic.fitting.free import checked_free
 from tdacoustic.fleet import load_fleet
-from tdacoustic.workflows.housing_sound import checked_free
 from tdacoustic.workflows.microphones import microphone_doubts, microphones
 
 MOTOR = """

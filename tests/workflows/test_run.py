@@ -70,9 +70,11 @@ def test_the_demonstration_has_all_its_files_and_the_contracts_hold(tda, tmp_pat
     assert faults(tmp_path / "out") == []
     lines = out.splitlines()
     assert [line.split(" (")[0] for line in lines[:5]] == [f"Condition {n}" for n in range(1, 6)]
-    assert lines[5].startswith("Calibration: masuda.constant_db 20 to ")
+    assert lines[5].startswith("Calibration: Masuda constant 20 to ")
     assert lines[6].startswith("Prediction with the calibrated fleet: at 4 m ")
-    assert lines[7:] == [str(Path("out") / "report.html")]
+    assert lines[7].startswith("What if (the model's level at 4 m): at 20 km/h 10 dB less from the motor takes ")
+    assert "which are 6 to 16 % of the recorded sound energy: as long as the rest stays, the recorded" in lines[7]
+    assert lines[8:] == [str(Path("out") / "report.html")]
     manifest = manifest_of(tmp_path / "out")
     assert (manifest["command"], manifest["fleet"]["name"]) == ("run", "CRRC freight locomotive")
     assert manifest["problems"] == warnings_of(err)

@@ -123,7 +123,7 @@ def test_the_main_job_has_the_intervals_of_the_calibration(tda, tmp_path):
         where = {name: row[name] for name in ("condition", "receiver", "weighting")}
         assert row["before_db"] == pytest.approx(one(levels, path="total", **where)["level_db"], abs=1e-6)
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
-    assert "What if (level at 4 m): at 20 km/h" in report
+    assert "What if (the model's level at 4 m): at 20 km/h" in report.replace("&#39;", "'")
 
 
 def test_the_calibrated_fleet_keeps_the_cases(tda, tmp_path):
@@ -138,6 +138,24 @@ def test_a_wrong_condition_is_said_before_anything_is_computed(tda, tmp_path):
     assert (code, out) == (1, "")
     assert "[[what_if]] 'a': conditions names '99', which is no condition; there are 1, 2, 3, 4, 5, 6" in err
     assert len(err.splitlines()) == 1
+
+
+@pytest.mark.parametrize("command", ["calibrate", "run"])
+def test_a_wrong_condition_is_said_before_a_campaign_is_read(tda, tmp_path, monkeypatch, command):
+    wrong = '[[what_if]]\nname = "a"\nmotor_db = -3\nconditions = ["2", "7", "99"]\n'
+    path = campaign_file(tmp_path / "f", wrong)
+    monkeypatch.setattr("tdacoustic.workflows.joint_levels.joint_levels", lambda *_: pytest.fail("too late"))
+    monkeypatch.setattr("tdacoustic.workflows.analyze.analyze", lambda *_, **__: pytest.fail("too late"))
+    code, out, err = tda(command, path, "-o", "out")
+    assert (code, out) == (1, "")
+    assert "[[what_if]] 'a': conditions names '7', '99', which are no conditions; there are 2, 4, 6, 1, 3, 5" in err
+    assert len(err.splitlines()) == 1
+
+
+def test_the_main_job_computes_changes_once(tda, tmp_path, monkeypatch):
+    monkeypatch.setattr("tdacoustic.workflows.what_if.predicted_what_if", lambda *_, **__: pytest.fail("twice"))
+    assert tda("run", campaign_file(tmp_path / "c"), "-o", "out", "--quiet")[0] == 0
+    assert table_in(tmp_path / "out")["change_low_db"].notna().any()
 
 
 def test_a_change_without_effect_is_a_warning_of_the_result(tda, tmp_path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from tdacoustic.fitting.calibration import Calibration, FittedParameter
+from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import (
     Block,
     Details,
@@ -30,7 +31,10 @@ from tdacoustic.reporting.sections.calibration_tables import (
     sources_table,
     transfer_table,
 )
+from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.parameters import key_words, keyed_words, quantity_of
 from tdacoustic.reporting.sections.printed import LARGEST_ERROR_DB, MODEL_4M, is_of_the_paper
+from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import CampaignCalibration
 
 __all__ = ["calibration_answer", "calibration_section"]
@@ -45,7 +49,7 @@ MANY_LEVELS = 24
 def calibration_answer(result: CampaignCalibration) -> list[Block]:
     """Return what the calibration found in sentences, then its doubts."""
     found = result.calibration
-    sentences = [_value_words(parameter) for parameter in found.parameters]
+    sentences = [_value_words(parameter, found.fleet) for parameter in found.parameters]
     sentences.append(_misfit_words(result))
     left = [item.error_db for item in found.left_out if item.error_db is not None]
     if left:
@@ -61,8 +65,13 @@ def _sentence(doubt: str) -> str:
     return f"{doubt if starts_with_key else doubt[:1].upper() + doubt[1:]}."
 
 
-def _value_words(parameter: FittedParameter) -> str:
-    text = f"{parameter.key} is {parameter.value:.4g} (it was {parameter.initial:.4g})"
+def _value_words(parameter: FittedParameter, fleet: Fleet) -> str:
+    return pretty_signs(sentence(_of_parameter(parameter, fleet)))
+
+
+def _of_parameter(parameter: FittedParameter, fleet: Fleet) -> str:
+    key = parameter.key
+    text = f"{keyed_words(key, fleet)} is {quantity_of(key, parameter.value)} (it was {parameter.initial:.4g})"
     if parameter.expression is not None:
         return f"{text}, by {parameter.expression}."
     if parameter.ci95 is None:
@@ -102,7 +111,7 @@ def _next_words(found: Calibration) -> list[str]:
     best = found.next_measurements[0]
     if best.mean_remaining > HARDLY_SHORTER:
         return ["No single further level is expected to shorten the intervals by more than some per cent."]
-    parts = [f"{name} {100.0 * part:.0f} %" for name, part in best.remaining.items()]
+    parts = [f"{key_words(name, found.fleet)} {100.0 * part:.0f} %" for name, part in best.remaining.items()]
     return [
         f"What would tell most next is a level at {best.condition.train_speed_km_h:.3g} km/h and "
         f"{best.condition.torque_n_m:.4g} N m, {best.receiver.name}: of the intervals it would leave "
@@ -163,8 +172,8 @@ def _printed_words(result: CampaignCalibration) -> str:
     fast = [ours.get(name, math.nan) for name in ("5", "6")]
     if fast[1] >= fast[0]:
         text += (
-            f" The paper's fall from condition 5 to 6 is not reproduced: the calibrated model has {fast[0]:.1f} and "
-            f"{fast[1]:.1f} dB there."
+            f" The paper's level falls from condition 5 to 6; the calibrated model has {fast[0]:.1f} and {fast[1]:.1f} "
+            "dB there."
         )
     return text
 

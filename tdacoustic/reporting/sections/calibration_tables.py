@@ -6,8 +6,11 @@ from typing import Final
 
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.sections.parameters import key_words
 from tdacoustic.reporting.sections.sound_paths import heard_paths
+from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import CampaignCalibration
+from tdacoustic.studies.words import unit_of
 
 __all__ = [
     "MOST_ROWS",
@@ -28,7 +31,8 @@ MOST_ROWS: Final = 8
 def parameters_table(found: Calibration) -> Table:
     """Return the fitted values with their intervals, bounds and priors."""
     columns = (
-        Column("parameter", "Parameter"),
+        Column("words", "Parameter"),
+        Column("unit", "Unit"),
         Column("initial", "Before", kind="number"),
         Column("value", "After", kind="number"),
         Column("stderr", "±", "1 σ", kind="number"),
@@ -36,12 +40,16 @@ def parameters_table(found: Calibration) -> Table:
         Column("high", "95 % to", kind="number"),
         Column("bounds", "Bounds"),
         Column("prior", "Prior or expression"),
+        Column("parameter", "Key"),
     )
     rows: list[list[Cell]] = []
     for p in found.parameters:
         low, high = (None, None) if p.ci95 is None else p.ci95
         before = p.expression or ("none" if p.prior is None else f"{p.prior[0]:.4g} ± {p.prior[1]:.3g}")
-        rows.append([p.key, p.initial, p.value, p.stderr, low, high, f"{p.low:g} to {p.high:g}", before])
+        bounds, before = (pretty_signs(text) for text in (f"{p.low:g} to {p.high:g}", before))
+        unit = unit_of(p.key) if "." in p.key else ""
+        words = key_words(p.key, found.fleet)
+        rows.append([words, unit, p.initial, p.value, p.stderr, low, high, bounds, before, p.key])
     return Table("calibrated-parameters", "Fitted parameters", columns, rows, origin="calculated")
 
 

@@ -28,6 +28,9 @@ __all__ = ["coupling_section"]
 WORDS: Final = {"one_way": "one-way", "two_way": "two-way"}
 STYLES: Final[dict[str, LineStyle]] = {"one_way": "dashed", "two_way": "solid"}
 
+SMALLEST_DB: Final = 0.05
+"""Changes that are none at the decimals shown."""
+
 METHOD = (
     "One-way coupling takes the bearing forces on seats that do not move and applies them to the housing. In two-way "
     "coupling the seats give way: the housing's modes enter the receptance that the mesh feels and the force that a "
@@ -88,7 +91,7 @@ def _range(coupling: Coupling) -> tuple[float, float]:
 
 
 def _decibels(value: float) -> str:
-    return pretty_signs(f"{value:+.1f} dB")
+    return pretty_signs(f"{round(value, 1) + 0.0:+.1f} dB") if abs(value) >= SMALLEST_DB else "0.0 dB"
 
 
 def _said(coupling: Coupling, differences: tuple[ForceDifference, ...]) -> list[str]:
@@ -115,6 +118,9 @@ def _change_words(what: str, coupling: Coupling, name: str) -> str:
     if not held:
         return ""
     (least, one), (most, other) = min(held, key=lambda p: p[0]), max(held, key=lambda p: p[0])
+    if max(abs(least), abs(most)) < SMALLEST_DB:
+        where = f" in condition {one.condition}" if len(held) == 1 else ""
+        return f"{what} does not change{where} with two-way coupling (less than {SMALLEST_DB:g} dB)."
     if len(held) == 1:
         return f"{what} changes by {_decibels(least)} in condition {one.condition} with two-way coupling."
     return (

@@ -62,18 +62,16 @@ def _of(result: FleetPrediction, found: SweepResult) -> Section:
             blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
         elif len(axes) == 2 and numeric and all(len(values) > 1 for _, values in axes):
             blocks += _maps(result, found, name)
+    keys = joined([f"{_label(result, key)} is {key}" for key, _ in axes])
+    blocks.append(Paragraph(f"In the fleet file: {keys}."))
     table = _table(result, found, name)
     blocks.append(table if len(table.rows) <= 12 else Details("Levels at each point", [table]))
     return Section(name, found.sweep.name, blocks)
 
 
 def _label(result: FleetPrediction, key: str) -> str:
-    words = number_words(key, result.fleet) if _is_known(result, key) else key
+    words = number_words(key, result.fleet)
     return f"{words[:1].upper()}{words[1:]}"
-
-
-def _is_known(result: FleetPrediction, key: str) -> bool:
-    return not key.rpartition(".")[2].isdecimal() or key.split(".")[0] in ("gear_pair", "gear_dynamics", "housing")
 
 
 def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
@@ -110,11 +108,14 @@ def _maps(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]
         z = levels[:, :, place][order_y][:, order_x]
         if not np.isfinite(z).any():
             continue
+        low, high = float(np.nanmin(z)), float(np.nanmax(z))
         scale = Axis("Level", "dB", reference="20 µPa")
+        caption = f"The colours reach from {low:.1f} to {high:.1f} dB; each condition has a scale of its own."
         x, y = (np.array(held, dtype=float)[of] for held, of in ((values_x, order_x), (values_y, order_y)))
         heat = Heatmap(x, y, z, f"condition {condition}", scale)
         title = f"Total in condition {condition} over both parameters"
-        figures.append(FigureBlock(Figure(slug(name, condition), title, "", axes[0], axes[1], [heat]), "calculated"))
+        drawn = Figure(slug(name, condition), title, caption, axes[0], axes[1], [heat])
+        figures.append(FigureBlock(drawn, "calculated"))
     return [*figures[:1], *([Details("The other conditions", figures[1:])] if figures[1:] else [])]
 
 
@@ -122,7 +123,7 @@ def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
     keys = [key for key, _ in found.sweep.parameters]
     columns = [Column("point", "Point", "", 0, "number")]
     columns += [Column(key.replace(".", "_"), _label(result, key), unit_of(key)) for key in keys]
-    columns += [Column(f"condition_{one}", one, "dB", 1, "number") for one in found.conditions]
+    columns += [Column(f"condition_{one}", f"Condition {one}", "dB", 1, "number") for one in found.conditions]
     columns += [Column("reason", "Why not")] if any(found.reasons) else []
     levels = found.of("spl_4m_db")
     rows: list[list[Cell]] = []

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive import Directivity
+from tdacoustic.drive.doubts import circle_doubts
 from tdacoustic.drive.levels import paths_of_total
 from tdacoustic.drive.patterns import FLAT_DB, SHAPED_DB, Pattern
 from tdacoustic.reporting.document import (
@@ -18,6 +19,7 @@ from tdacoustic.reporting.document import (
     Column,
     Details,
     FigureBlock,
+    Notice,
     Paragraph,
     Section,
     Sentences,
@@ -25,6 +27,7 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
 from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
 from tdacoustic.reporting.sections.sound_paths import heard_paths, is_added
 from tdacoustic.reporting.sections.words import joined, pretty_signs
@@ -55,7 +58,7 @@ def directivity(result: FleetPrediction) -> Section | None:
     speeds, angles = _over_speed(result), _over_helix(result)
     if not any(around.range_db >= FLAT_DB for around in (*speeds, *angles)):
         return None
-    blocks: list[Block] = [Paragraph(_method(result))]
+    blocks: list[Block] = [Paragraph(_method(result)), *_node_planes(result)]
     if speeds:
         said = _speed_words(result, speeds)
         blocks += [Sentences(said)] if said else []
@@ -72,6 +75,13 @@ def directivity(result: FleetPrediction) -> Section | None:
         ]
         blocks.append(Details("Directions over the helix angles", folded))
     return Section("directivity", "Directions", blocks)
+
+
+def _node_planes(result: FleetPrediction) -> list[Notice]:
+    """Where the circle lies in a node plane of the sound, which is a doubt of the prediction too."""
+    held = result.prediction
+    sounds = [*held.sound, *(case.sound for case in held.helix)]
+    return [Notice("warning", sentence(text)) for text in circle_doubts(result.fleet, sounds, held.directivity)]
 
 
 def _over_speed(result: FleetPrediction) -> list[Around]:
@@ -115,7 +125,8 @@ def _method(result: FleetPrediction) -> str:
 def _speed_words(result: FleetPrediction, speeds: list[Around]) -> list[str]:
     widest = max(speeds, key=lambda around: around.range_db)
     found = [f"the directions differ most in condition {widest.name}, by {widest.range_db:.1f} dB"]
-    return [sentence(text) for text in (*found, _beyond_words(result), _shape_words(result, speeds)) if text]
+    found += [_beyond_words(result), _shape_words(result, speeds), judged_words(result, ("pattern", "loudest_deg"))]
+    return [sentence(text) for text in found if text]
 
 
 def _beyond_words(result: FleetPrediction) -> str:

@@ -28,12 +28,14 @@ from tdacoustic.reporting.sections.gear_words import (
 from tdacoustic.reporting.sections.helix_sweep import helix_words
 from tdacoustic.reporting.sections.loads_over_speed import largest_words, rise_words
 from tdacoustic.reporting.sections.meshing_noise import reading_words
+from tdacoustic.reporting.sections.paper_features import features_words
 from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
 from tdacoustic.reporting.sections.sound_field import sound_words
 from tdacoustic.reporting.sections.speed_sweep import sweep_words
+from tdacoustic.reporting.sections.what_if import what_if_line
 from tdacoustic.results import FleetPrediction
 
-__all__ = ["gear_answer", "gear_overview", "regime_words"]
+__all__ = ["asked_lines", "gear_answer", "gear_overview", "regime_words"]
 
 SCOPE = (
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
@@ -54,7 +56,14 @@ TERMS = (
 def gear_answer(result: FleetPrediction) -> list[Block]:
     """Return the summary: the regime, a sentence a condition, what holds over the conditions, then the doubts."""
     doubts = [Notice("warning", sentence(doubt)) for doubt in result.prediction.doubts]
-    return [*_said(result), *doubts, _table(result)]
+    asked = asked_lines(result)
+    return [*_said(result), *([Sentences(asked)] if asked else []), *doubts, _table(result)]
+
+
+def asked_lines(result: FleetPrediction) -> list[str]:
+    """Return what was asked of the model in a line each: another source's features, and what a change would bring."""
+    features, changes = features_words(result), what_if_line(result.what_if)
+    return [*([sentence(features)] if features else []), *([changes] if changes else [])]
 
 
 def gear_overview(result: FleetPrediction) -> Section:

@@ -22,7 +22,6 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
 from tdacoustic.reporting.sections.gear_words import hertz
-from tdacoustic.reporting.sections.printed import is_of_the_paper
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
 
@@ -45,16 +44,10 @@ MASS_LAW: Final = (
     "resonate, and towards the coincidence of bending and sound waves, more goes through."
 )
 
-ROUGH: Final = ((175.0, 20.0), (350.0, 26.0), (525.0, 30.0), (1001.0, 13.0))
-"""Frequency and insertion loss of the project's earlier rough estimate for the paper's drive, give or take `ROUGH_DB`;
-the paper prints none."""
-
-ROUGH_DB: Final = 10.0
 CAPTION: Final = (
     "Insertion loss at the mesh frequencies; with half and twice the loss factor η of the air inside; least and most "
     f"with the source there and {1e3 * ASIDE_M:g} mm off along x, y and z"
 )
-_SAME_HZ: Final = 0.01
 _SENSITIVE_DB: Final = 5.0
 """Change of the insertion loss from which the report names what changes it [assumed]."""
 
@@ -67,15 +60,9 @@ def insertion_loss_section(result: FleetPrediction) -> Section | None:
     fleet = result.fleet
     blocks: list[Block] = [
         Paragraph(METHOD.format(surface=result.prediction.surface, place=_place_words(fleet, held))),
-        Sentences(
-            [
-                text
-                for text in (_range_words(held), _of_air_words(held), _aside_words(held), _rough_words(fleet, held))
-                if text
-            ]
-        ),
+        Sentences([text for text in (_range_words(held), _of_air_words(held), _aside_words(held)) if text]),
         FigureBlock(_figure(held), "calculated"),
-        _at_mesh(fleet, held),
+        _at_mesh(held),
         Details("Third octaves", [_third_octaves(held)]),
         Sentences([_placement_words(fleet, held), _air_words(held), MASS_LAW, LEFT_OUT]),
     ]
@@ -139,31 +126,6 @@ def _aside_words(held: InsertionLoss) -> str:
         f"The place of the source matters too: there and {1e3 * ASIDE_M:g} mm off along x, y or z it is {parts}. A "
         "symmetric box with the source in its planes of symmetry answers with a part of its modes only."
     )
-
-
-def _rough_of(fleet: Fleet, mesh: MeshLoss) -> float | None:
-    """The rough estimate at a mesh frequency, for the paper's drive."""
-    if not is_of_the_paper(fleet):
-        return None
-    near = (loss for frequency, loss in ROUGH if abs(frequency - mesh.frequency_hz) <= _SAME_HZ * frequency)
-    return next(near, None)
-
-
-def _rough_words(fleet: Fleet, held: InsertionLoss) -> str:
-    pairs = [(mesh, rough) for mesh in _known(held) if (rough := _rough_of(fleet, mesh)) is not None]
-    if not pairs:
-        return ""
-    within = [mesh.condition for mesh, rough in pairs if abs((mesh.loss_db or 0.0) - rough) <= ROUGH_DB]
-    beyond = [
-        f"{pretty_signs(f'{(mesh.loss_db or 0.0) - rough:+.0f}')} dB in condition {mesh.condition}"
-        for mesh, rough in pairs
-        if mesh.condition not in within
-    ]
-    said = joined([f"{loss:g} dB at {frequency:g} Hz" for frequency, loss in ROUGH])
-    start = f"The project's earlier rough estimate for this drive ({said}, give or take {ROUGH_DB:g} dB)"
-    parts = [f"is met in condition{'s' if len(within) > 1 else ''} {joined(within)}"] if within else []
-    parts += [f"is missed by {joined(beyond)}"] if beyond else []
-    return f"{start} {' and '.join(parts)}; a single line says little where peaks and dips lie this close."
 
 
 def _placement_words(fleet: Fleet, held: InsertionLoss) -> str:
@@ -236,7 +198,7 @@ def _steps(held: InsertionLoss) -> tuple[np.ndarray, np.ndarray]:
     return edges.ravel(), np.repeat(held.band_db, 2)
 
 
-def _at_mesh(fleet: Fleet, held: InsertionLoss) -> Table:
+def _at_mesh(held: InsertionLoss) -> Table:
     columns = [
         Column("condition", "Condition"),
         Column("frequency_hz", "Mesh frequency", "Hz", 1, "number"),
@@ -247,14 +209,10 @@ def _at_mesh(fleet: Fleet, held: InsertionLoss) -> Table:
         Column("beside_low_db", "Moved: least", "dB", 1, "number"),
         Column("beside_high_db", "most", "dB", 1, "number"),
     ]
-    rough = [_rough_of(fleet, mesh) for mesh in held.at_mesh]
-    if any(value is not None for value in rough):
-        columns.insert(3, Column("rough_db", "Rough", f"dB, ± {ROUGH_DB:g}", 0, "number"))
     rows: list[Sequence[Cell]] = []
-    for mesh, value in zip(held.at_mesh, rough, strict=True):
-        cells: list[Cell] = [mesh.condition, mesh.frequency_hz, mesh.loss_db]
-        cells += [value] if len(columns) > 8 else []
-        rows.append([*cells, mesh.mass_law_db, *(mesh.of_air_db or (None, None)), *(mesh.beside_db or (None, None))])
+    for mesh in held.at_mesh:
+        cells: list[Cell] = [mesh.condition, mesh.frequency_hz, mesh.loss_db, mesh.mass_law_db]
+        rows.append([*cells, *(mesh.of_air_db or (None, None)), *(mesh.beside_db or (None, None))])
     return Table("insertion-loss-at-mesh", CAPTION, columns, rows, origin="calculated")
 
 

@@ -1,13 +1,18 @@
-"""Bearing forces over the conditions, and whether they do what Fig. 10 of the paper shows."""
+"""Bearing forces over the conditions: where they are largest, and how they go with speed.
+
+Whether that is what another source says is judged in one place, by the fleet's ``[[feature]]``: here are the figures.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.drive import GearState
+from tdacoustic.fleet.studies import FLAT_DB
 from tdacoustic.gears import DIRECTIONS, GEARS
 from tdacoustic.reporting.document import (
     Block,
@@ -15,27 +20,30 @@ from tdacoustic.reporting.document import (
     Column,
     Details,
     FigureBlock,
-    Paragraph,
     Section,
     Sentences,
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Line
 from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, first_harmonic_n, hertz, newtons, sentence
-from tdacoustic.reporting.sections.printed import PAPER
+from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
+from tdacoustic.studies.shapes import shape_of
 
 __all__ = ["largest_words", "loads_over_speed", "rise_words"]
 
 FEWEST = 3
 """Speeds below which nothing can rise and then fall."""
 
-FEATURES = (
-    f"Fig. 10 of {PAPER} shows three features: the tangential force (y) is the largest, all directions follow the "
-    "same pattern, and the forces rise and then fall as the mesh frequency grows. Whether this drive does the same, at "
-    "the line of the mesh frequency:"
-)
+COURSES: Final = {
+    "flat": "stays the same",
+    "rises": "rises",
+    "falls": "falls",
+    "rises_then_falls": "rises, then falls",
+    None: "up and down",
+}
+"""Shapes of `shape_of` in words."""
 
 
 def loads_over_speed(result: FleetPrediction, loaded: Sequence[GearState]) -> Section:
@@ -51,9 +59,8 @@ def loads_over_speed(result: FleetPrediction, loaded: Sequence[GearState]) -> Se
     figures = [FigureBlock(_figure(loaded, first, gear), "calculated") for gear in range(len(GEARS))]
     blocks: list[Block] = [
         *(figures if len(loaded) > 1 else ()),
-        Paragraph(FEATURES),
-        Sentences([sentence(largest_words(loaded))]),
-        _features(loaded, first),
+        Sentences([sentence(text) for text in (largest_words(loaded), judged_words(result, ("_force_",))) if text]),
+        _courses(loaded, first),
         _table(loaded, first, "forces-first", "Amplitude of the first mesh harmonic"),
         Details(
             "Rms of all lines, and mean forces",
@@ -95,12 +102,11 @@ def largest_words(loaded: Sequence[GearState]) -> str:
         joined([f"{count} of {len(loaded)} conditions ({gear})" for count, gear in zip(counted, GEARS, strict=True)])
         for counted in (first, whole)
     ]
-    overall = "met" if min(first + whole) == len(loaded) else "met in part" if max(first + whole) else "not met"
     if first == whole:
         where = f"both at the mesh frequency and by the rms of all lines in {counts[0]}"
     else:
         where = f"at the mesh frequency in {counts[0]}, by the rms of all lines in {counts[1]}"
-    return f"the y force is the largest: {overall}, {where}"
+    return f"the tangential force (y) is the largest of the three {where}"
 
 
 def _y_is_largest(values: NDArray[np.float64]) -> list[int]:
@@ -114,55 +120,54 @@ def _rms(loaded: Sequence[GearState]) -> NDArray[np.float64]:
 
 
 def rise_words(loaded: Sequence[GearState]) -> str:
-    """Say for how many gears and directions the first mesh harmonic rises and then falls."""
-    verdicts = {
-        f"{gear} {direction}": _rise_and_fall(loaded, values)[0]
+    """Say for which gears and directions the first mesh harmonic rises, then falls; empty of too few speeds."""
+    courses = {
+        f"{gear} {direction}": _course(loaded, values)[0]
         for gear, of_gear in zip(GEARS, _over_conditions(loaded), strict=True)
         for direction, values in zip(DIRECTIONS, of_gear, strict=True)
     }
-    if "" in verdicts.values():
-        return f"fewer than {FEWEST} speeds, so nothing can be said of forces that rise and then fall"
-    met = [name for name, verdict in verdicts.items() if verdict == "met"]
-    missed = [name for name in verdicts if name not in met]
-    named = [f"met at {joined(met)}" if missed else "met at all"] if met else []
-    named += [f"not met at {joined(missed)}" if met else "not met at any"] if missed else []
-    return f"the forces at the mesh frequency rise and then fall over the speeds: {'; '.join(named)}"
+    if "" in courses.values():
+        return ""
+    there = [name for name, course in courses.items() if course == COURSES["rises_then_falls"]]
+    others = [name for name in courses if name not in there]
+    where = f" at {joined(there)}" if others else " in every direction"
+    but = f", not at {joined(others)}" if there and others else ""
+    if not there:
+        return "no force at the mesh frequency rises, then falls over the speeds"
+    return f"the force at the mesh frequency rises, then falls over the speeds{where}{but}"
 
 
-def _rise_and_fall(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[str, str]:
-    """Verdict, empty where it cannot be judged, and the figures behind it."""
+def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[str, str]:
+    """How a force goes over the speeds, empty of too few of them, and the figures behind it."""
     mesh, places = np.unique([state.mesh_hz for state in loaded], return_index=True)
     values = values[places]
     listed = ", ".join(newtons(value) for value in values)
     if mesh.size < FEWEST:
         return "", f"{listed}: at least {FEWEST} speeds are needed"
-    steps, peak = np.diff(values), int(values.argmax())
-    start, top, end = (f"{newtons(values[at])} at {hertz(mesh[at])}" for at in (0, peak, -1))
-    if (steps[:peak] > 0.0).all() and (steps[peak:] < 0.0).all():
-        if 0 < peak < values.size - 1:
-            return "met", f"from {start} up to {top}, then down to {end}"
-        return "not met", f"{'rises' if peak else 'falls'} throughout, from {start} to {end}"
-    return "not met", f"up and down: {listed}; largest {top}"
+    with np.errstate(divide="ignore"):
+        shape = shape_of(20.0 * np.log10(values), FLAT_DB)
+    start, top, end = (f"{newtons(values[at])} at {hertz(mesh[at])}" for at in (0, int(values.argmax()), -1))
+    figures = {
+        "rises_then_falls": f"from {start} up to {top}, then down to {end}",
+        None: f"{listed}; largest {top}",
+    }
+    return COURSES[shape], figures.get(shape, f"from {start} to {end}")
 
 
-def _features(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
+def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
     rows: list[list[Cell]] = []
     for gear, name in enumerate(GEARS):
         for number, direction in enumerate(DIRECTIONS):
-            verdict, figures = _rise_and_fall(loaded, first[gear, number])
-            rows.append(["Rises, then falls", name, direction, verdict or "not judged", figures])
-        peaks = first[gear].argmax(axis=1)
-        where = [f"{d} at {hertz(loaded[int(at)].mesh_hz)}" for d, at in zip(DIRECTIONS, peaks, strict=True)]
-        verdict = "not judged" if len(loaded) < FEWEST else "met" if np.unique(peaks).size == 1 else "not met"
-        rows.append(["All directions peak together", name, "all", verdict, f"largest: {', '.join(where)}"])
+            course, figures = _course(loaded, first[gear, number])
+            rows.append([name, direction, course, figures])
     columns = (
-        Column("feature", "Feature"),
         Column("gear", "Gear"),
         Column("direction", "Direction"),
-        Column("verdict", "Verdict", kind="verdict"),
+        Column("course", "With speed"),
         Column("figures", "Figures, conditions by rising mesh frequency"),
     )
-    return Table("force-features", "Features of Fig. 10, met or not", columns, rows, origin="calculated")
+    caption = f"How the forces at the mesh frequency go with speed; {FLAT_DB:g} dB up or down count as level"
+    return Table("force-courses", caption, columns, rows, origin="calculated")
 
 
 def _table(loaded: Sequence[GearState], values: NDArray[np.float64], name: str, caption: str) -> Table:

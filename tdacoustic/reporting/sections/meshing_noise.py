@@ -11,7 +11,8 @@ from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
-from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, hertz, level_unit, sentence
+from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, level_unit, sentence
+from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.printed import (
     DTE_PP_UM,
@@ -69,7 +70,9 @@ def meshing_noise(result: FleetPrediction) -> Section:
     if not _is_calibrated(result.fleet):
         blocks.append(Paragraph(OPEN))
     if beside and reference is not None:
-        blocks += _comparison(result.fleet, states, beside)
+        blocks += _comparison(states, beside)
+    judged = judged_words(result, ("masuda_",))
+    blocks += [Paragraph(sentence(judged))] if judged else []
     return Section("meshing-noise", "Meshing noise", blocks)
 
 
@@ -173,7 +176,7 @@ def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, bes
     )
 
 
-def _comparison(fleet: Fleet, states: Sequence[GearState], beside: Beside) -> list[Block]:
+def _comparison(states: Sequence[GearState], beside: Beside) -> list[Block]:
     of_figure = next(row for row in TABLE_5 if row.condition == FIGURE_11_CONDITION)
     factor = 10.0 ** ((of_figure.level_db - LEVEL_OF_TEXT_DB) / 20.0)
     notice = (
@@ -182,8 +185,8 @@ def _comparison(fleet: Fleet, states: Sequence[GearState], beside: Beside) -> li
         f"4.3 (with X = {DTE_PP_UM:g} µm) and {of_figure.level_db:g} dB in Table 5, a factor of {factor:.2f} in W X. "
         "Neither the torque, the transmission error nor the inertias, bearings and damping behind Table 5 are printed."
     )
-    items = [text for text in (_offset_words(states, beside), *_shape_words(fleet, states, beside)) if text]
-    return [Notice("info", notice), Sentences([sentence(text) for text in items])]
+    offset = _offset_words(states, beside)
+    return [Notice("info", notice), *([Sentences([sentence(offset)])] if offset else [])]
 
 
 def _offset_words(states: Sequence[GearState], beside: Beside) -> str:
@@ -198,28 +201,3 @@ def _offset_words(states: Sequence[GearState], beside: Beside) -> str:
         f"constant would take up; in shape the two then differ by {rest:.1f} dB rms, at most by "
         f"{np.abs(off - off.mean()).max():.1f} dB"
     )
-
-
-def _shape_words(fleet: Fleet, states: Sequence[GearState], beside: Beside) -> list[str]:
-    """The features of Table 5 that a shape can have, met or not met; nothing unless all six conditions are there."""
-    levels = {row.condition: s.masuda_db for s in states if (row := beside.get(s.condition.name)) is not None}
-    held = {name: level for name, level in levels.items() if level is not None}
-    if len(held) < len(TABLE_5):
-        return []
-    unit, printed = level_unit(fleet), {row.condition: row for row in TABLE_5}
-    loudest, of_table = (
-        max(of, key=lambda name: of[name]) for of in (held, {n: r.level_db for n, r in printed.items()})
-    )
-    parts = [
-        (f"rise from condition 1 to 2 (Table 5: {printed['2'].level_db - printed['1'].level_db:+.1f} dB)")
-        + _met(held["2"] > held["1"], f"{held['2'] - held['1']:+.1f} {unit}"),
-        f"maximum in condition 4 or 5 (Table 5: condition {of_table})"
-        + _met(loudest in ("4", "5"), f"in condition {loudest}, {hertz(printed[loudest].mesh_hz)}"),
-        f"lower in condition 6 than in 5 (Table 5: {printed['6'].level_db - printed['5'].level_db:+.1f} dB)"
-        + _met(held["6"] < held["5"], f"{held['6'] - held['5']:+.1f} {unit}"),
-    ]
-    return [pretty_signs(part) for part in parts]
-
-
-def _met(holds: bool, figures: str) -> str:
-    return f": {'met' if holds else 'not met'}, {figures}"

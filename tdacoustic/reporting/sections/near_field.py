@@ -80,6 +80,8 @@ def _words(result: FleetPrediction, fields: list[NearField]) -> list[str]:
         parts += [] if inside is None else [f"the highest level inside is {_at(inside)}{_of_inside(field)}"]
         if parts:
             found.append(sentence(f"condition {field.condition}: {'; '.join(parts)}"))
+        seen = _seen_words(field)
+        found += [sentence(f"condition {field.condition}, as the maps show it: {seen}")] if seen else []
     found += _beyond_words(fields)
     if is_of_the_paper(result.fleet):
         found.append(_paper_words(fields))
@@ -88,6 +90,29 @@ def _words(result: FleetPrediction, fields: list[NearField]) -> list[str]:
     if len(fields) > 1:
         found.append(_alike_words(result, fields))
     return found
+
+
+def _seen_words(field: NearField) -> str:
+    """What stands out on the maps: the brightest path outside, how far the level falls, and inside beside it."""
+    added = [path for path in TABLE_PATHS if path in field.adds]
+    brightest = {path: point.level_db for path in added if (point := field.highest("outside", path)) is not None}
+    outside, inside = field.highest("outside"), field.highest("inside")
+    if outside is None or not brightest:
+        return ""
+    first, *others = sorted(brightest, key=lambda path: -brightest[path])
+    told = f"outside {_phrase(first)} {'are' if first == 'motor' else 'is'} brightest"
+    if others:
+        told += f", by {brightest[first] - brightest[others[0]]:.0f} dB over {_phrase(others[0])}"
+    low = field.range_db("outside")
+    told += "" if low is None else f", and the level falls to {low[0]:.0f} dB at the darkest point"
+    if inside is not None:
+        apart = inside.level_db - outside.level_db
+        told += f"; inside it is up to {abs(apart):.0f} dB {'above' if apart >= 0.0 else 'below'} the brightest outside"
+    return told
+
+
+def _phrase(key: str) -> str:
+    return next(path.phrase for path in PATHS if path.key == key)
 
 
 def _of_inside(field: NearField) -> str:
@@ -212,8 +237,8 @@ def _figure(field: NearField, held: PlaneMap, limits: tuple[float, float]) -> Fi
     return Figure(
         slug("near-field", field.condition, plane.name.lower()),
         f"Level in the {plane.name} plane at {names[across]} = {_number(plane.at_m)} m, condition {field.condition}",
-        f"The colours reach from {limits[0]:.0f} to {limits[1]:.0f} dB in all three planes; what is beyond has the "
-        "colour of the end.",
+        f"One scale of colours, {limits[0]:.0f} to {limits[1]:.0f} dB, for outside and inside and all three planes of "
+        "the condition; what is beyond has the colour of the end.",
         Axis(names[right], "m", limits=edge),
         Axis(names[up], "m", limits=edge),
         elements,

@@ -25,8 +25,9 @@ from tdacoustic.studies import QUANTITIES, FeatureCheck, ReferenceCheck
 from tdacoustic.studies.responses import SCAN_DB, SCAN_FACTORS
 from tdacoustic.studies.words import difference_words, feature_words, margin_words, quantity_words, reference_words
 
-__all__ = ["features_words", "paper_features"]
+__all__ = ["features_words", "judged_words", "paper_features"]
 
+QUOTES: Final = ("\N{LEFT DOUBLE QUOTATION MARK}", "\N{RIGHT DOUBLE QUOTATION MARK}")
 _UNITS: Final = {"db": "dB", "um": "µm", "n": "N", "hz": "Hz", "deg": "°"}
 
 
@@ -35,8 +36,6 @@ def paper_features(result: FleetPrediction) -> Section | None:
     references, features = result.studies.references, result.studies.features
     if not references and not features:
         return None
-    of_paper = is_of_the_paper(result.fleet)
-    title = "Printed numbers and features beside the model's" if of_paper else "Other numbers beside the model's"
     blocks: list[Block] = [Paragraph(_method(result))]
     if features:
         blocks.append(Paragraph(f"Of {len(features)} features {_count(features)}."))
@@ -52,7 +51,12 @@ def paper_features(result: FleetPrediction) -> Section | None:
         words = [reference_words(check, result.fleet) for check in references]
         told = [one.dependence for one in words if one.dependence]
         blocks += [Details("What the numbers depend on", [Sentences(told)])] if told else []
-    return Section("references", title, blocks)
+    return Section("references", _title(result), blocks)
+
+
+def _title(result: FleetPrediction) -> str:
+    of_paper = is_of_the_paper(result.fleet)
+    return "Printed numbers and features beside the model's" if of_paper else "Other numbers beside the model's"
 
 
 def features_words(result: FleetPrediction) -> str:
@@ -60,9 +64,32 @@ def features_words(result: FleetPrediction) -> str:
     features = result.studies.features
     if not features:
         return ""
-    missing = [check.feature.label for check in features if check.holds is False]
-    text = f"of {len(features)} features that the fleet file states of another source {_count(features)}"
-    return f"{text}: {'; '.join(missing)}" if missing else text
+    of_whom = "of the paper" if is_of_the_paper(result.fleet) else "of another source"
+    parts = [f"of {len(features)} features {of_whom} {_count(features)}"]
+    for holds, lead in ((False, "not reproduced"), (None, "not determined")):
+        names = [check.feature.label for check in features if check.holds is holds]
+        parts += [f"{lead}: {', '.join(names)}"] if names else []
+    return "; ".join(parts)
+
+
+def judged_words(result: FleetPrediction, quantities: tuple[str, ...]) -> str:
+    """Return the verdicts on features of some quantities, and where they are reached; empty of none.
+
+    Parameters
+    ----------
+    result : FleetPrediction
+    quantities : tuple of str
+        Parts of the quantities' names.
+    """
+    held = [check for check in result.studies.features if any(part in check.feature.quantity for part in quantities)]
+    if not held:
+        return ""
+    named: dict[str, list[str]] = {}
+    for check in held:
+        named.setdefault(_verdict(check.holds), []).append(check.feature.label)
+    parts = [f"{verdict}: {', '.join(labels)}" for verdict, labels in named.items()]
+    section = f"{QUOTES[0]}{_title(result)}{QUOTES[1]}"
+    return f"features of another source, as judged in the section {section}: {'; '.join(parts)}"
 
 
 def _method(result: FleetPrediction) -> str:
@@ -70,9 +97,11 @@ def _method(result: FleetPrediction) -> str:
     vectors = " of those that need no new transfer vectors" if result.prediction.housing is not None else ""
     return (
         "Numbers and features that the fleet file states of another source. A margin is by how much a feature is "
-        "there (below zero: by how much it is missing), in dB where nothing else is said; amplitudes count as 20 lg. "
+        "there (below zero: by how much it is missing), in dB, in degrees of a direction, or in correlation; "
+        "amplitudes count as 20 lg. Up to a feature's tolerance (0.5 dB of a shape where the file says nothing) values "
+        "count as level: a rise or fall with a larger dip in it is none. "
         "A number is reproduced where the model is within the tolerance. What a margin or a difference depends on is "
-        "its change for 10 % more of an assumed parameter, or 1 dB more of a level. Each assumed parameter alone"
+        "its slope, told for 10 % more of an assumed parameter, or 1 dB more of a level. Each assumed parameter alone"
         f"{',' + vectors + ',' if vectors else ''} was also moved to {len(SCAN_FACTORS)} values from {low:.2g} to "
         f"{high:g} times its own (±{SCAN_DB[-1]:g} dB of a level), to see whether it alone could turn the verdict; "
         "between two such values the place is interpolated."

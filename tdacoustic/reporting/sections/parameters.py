@@ -4,10 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.sections.words import pretty_signs
+from tdacoustic.studies.words import number_words, unit_of
 
-__all__ = ["parameter_table", "value_words"]
+__all__ = ["key_words", "keyed_words", "parameter_table", "quantity_of", "value_words"]
+
+
+def key_words(key: str, fleet: Fleet) -> str:
+    """Return a dotted key in words; the key itself where the fleet has no such parameter.
+
+    Parameters
+    ----------
+    key : str
+    fleet : Fleet
+    """
+    if "." not in key:
+        return key
+    try:
+        fleet.value_of(key)
+    except FleetError:
+        return key
+    return number_words(key, fleet)
+
+
+def keyed_words(key: str, fleet: Fleet) -> str:
+    """Return a dotted key in words, with the key in brackets for whoever looks it up in the file."""
+    words = key_words(key, fleet)
+    return key if words == key else f"{words} ({key})"
+
+
+def quantity_of(key: str, value: float) -> str:
+    """Return a value with the unit that its key names.
+
+    Examples
+    --------
+    >>> quantity_of("model.structure_gain_db", 5.0748), quantity_of("gear_dynamics.mesh_damping_ratio", 0.5)
+    ('5.075 dB', '0.5')
+    """
+    unit = unit_of(key) if "." in key else ""
+    return pretty_signs(f"{value:.4g}") + (unit if unit == "°" else f" {unit}".rstrip())
 
 
 def parameter_table(name: str, caption: str, fleet: Fleet, named: Callable[[str], tuple[str, str] | None]) -> Table:
@@ -61,4 +99,4 @@ def value_words(key: str, value: object) -> str:
 
 
 def _number(value: float, digits: int = 6) -> str:
-    return f"{value:.{digits}g}".replace("e+0", "e").replace("e+", "e")
+    return pretty_signs(f"{value:.{digits}g}".replace("e+0", "e").replace("e+", "e"))

@@ -8,6 +8,7 @@ from tdacoustic.drive import GearState
 from tdacoustic.reporting.document import Block, Notice, Section, Sentences
 from tdacoustic.reporting.sections.answer import conditions_answer, verdicts_answer
 from tdacoustic.reporting.sections.calibration import calibration_answer
+from tdacoustic.reporting.sections.gear_answer import asked_lines
 from tdacoustic.reporting.sections.gear_words import (
     by_speed,
     conditions_words,
@@ -17,12 +18,12 @@ from tdacoustic.reporting.sections.gear_words import (
     sentence,
     state_words,
 )
+from tdacoustic.reporting.sections.parameters import key_words, quantity_of
 from tdacoustic.reporting.sections.sound_paths import SoundPath, heard_paths, is_added
-from tdacoustic.reporting.sections.what_if import what_if_line
-from tdacoustic.reporting.sections.words import joined
+from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import CampaignResult, FleetPrediction
 
-__all__ = ["calibration_line", "prediction_line", "run_answer"]
+__all__ = ["calibration_line", "model_lines", "prediction_line", "run_answer"]
 
 MOST_LEVELS = 8
 """Conditions whose levels are all named in a sentence; of more the slowest and the fastest are."""
@@ -30,8 +31,7 @@ MOST_LEVELS = 8
 
 def run_answer(result: CampaignResult) -> list[Block]:
     """Return the summary: all in a few lines, then sources, fit and prediction with what speaks against them."""
-    asked = "" if result.prediction is None else what_if_line(result.prediction.what_if)
-    lines = _dominance_line(result), calibration_line(result), prediction_line(result), asked
+    lines = _dominance_line(result), calibration_line(result), prediction_line(result), *model_lines(result)
     short = [line for line in lines if line]
     blocks: list[Block] = [Sentences(short)] if short else []
     blocks.append(Section("answer-sources", "Which source dominates", conditions_answer(result.analysis)))
@@ -54,12 +54,14 @@ def calibration_line(result: CampaignResult) -> str:
     if result.calibration is None:
         return ""
     found = result.calibration.calibration
-    values = [f"{p.key} {p.initial:.4g} to {p.value:.4g}" for p in found.parameters]
+    values = [
+        f"{key_words(p.key, found.fleet)} {p.initial:.4g} to {quantity_of(p.key, p.value)}" for p in found.parameters
+    ]
     errors = [(level.before_db - level.datum.level_db, level.error_db) for level in found.levels]
     before, after = (math.hypot(*side) / math.sqrt(len(errors)) for side in zip(*errors, strict=True))
     misfit = f"levels off by {before:.1f} dB rms before, {after:.1f} dB after"
     doubts = f"{len(found.doubts)} doubt{'s' if len(found.doubts) != 1 else ''}"
-    return f"Calibration: {', '.join(values)}; {misfit}; {doubts}."
+    return pretty_signs(f"Calibration: {', '.join(values)}; {misfit}; {doubts}.")
 
 
 def prediction_line(result: CampaignResult) -> str:
@@ -68,6 +70,11 @@ def prediction_line(result: CampaignResult) -> str:
         return ""
     levels = _level_words(result.prediction)
     return f"Prediction with {_which(result)}: {levels or 'no sound'}."
+
+
+def model_lines(result: CampaignResult) -> list[str]:
+    """Return the lines of `asked_lines` of the prediction."""
+    return [] if result.prediction is None else asked_lines(result.prediction)
 
 
 def _dominance_line(result: CampaignResult) -> str:

@@ -25,7 +25,7 @@ from tdacoustic.results import FleetPrediction
 from tdacoustic.studies import Sensitivity, Variation
 from tdacoustic.studies.responses import SILENT, STEP_DB, STEP_RELATIVE, VECTORS
 from tdacoustic.studies.sensitivity import per_words
-from tdacoustic.studies.words import number_words
+from tdacoustic.studies.words import number_words, unit_of
 
 __all__ = ["sensitivity"]
 
@@ -53,10 +53,11 @@ def sensitivity(result: FleetPrediction) -> Section | None:
 
 def _method(surface: str) -> str:
     return (
-        f"Change of the level at {surface} when a single parameter moves and all others stay, from central differences "
-        f"of ±{100.0 * STEP_RELATIVE:g} % of the parameter (±{STEP_DB:g} dB of a level) and told for 10 % more of it "
-        "(for 1 dB more of a level). Of a table over speed all rows move together. This is the slope here: near a "
-        "resonance a larger change can do much more, or the opposite."
+        f"Slopes of the level at {surface} when a single parameter moves and all others stay, from central differences "
+        f"of ±{100.0 * STEP_RELATIVE:g} % of the parameter (±{STEP_DB:g} dB of a level). What stands for +10 % is ten "
+        "times what 1 % does, and for +1 dB ten times what 0.1 dB does: linear, not computed with so much more. Near a "
+        "resonance such a step can do much more, or the opposite; [[what_if]] and [[sweep]] compute it. Of a table "
+        "over speed all rows move together."
     )
 
 
@@ -91,7 +92,7 @@ def _figure(result: FleetPrediction, found: Sensitivity, ranking: tuple[int, ...
     return Figure(
         "sensitivity",
         "Assumed parameters that the total depends on most",
-        f"Change of the total at {result.prediction.surface} for 10 % more, the largest in size {_or(held)}.",
+        f"Slope of the total at {result.prediction.surface}, told for 10 % more; the largest in size {_or(held)}.",
         Axis("Parameter"),
         Axis("Change of the level", "dB"),
         bars,
@@ -109,7 +110,7 @@ def _per(variation: Variation) -> str:
 
 def _table(result: FleetPrediction, found: Sensitivity) -> Table:
     columns = [
-        Column("parameter", "Parameter"),
+        Column("words", "Parameter"),
         Column("value", "Value"),
         Column("origin", "Where it comes from"),
         Column("per", "For"),
@@ -117,18 +118,25 @@ def _table(result: FleetPrediction, found: Sensitivity) -> Table:
     for over in _OVER:
         for case in found.cases:
             if case.over == over:
-                title = case.name if over == "conditions" else f"{case.name}°"
+                title = f"Condition {case.name}" if over == "conditions" else f"Helix {case.name}°"
                 columns.append(Column(f"{over}_{case.name}", title, "dB", 2, "number"))
+    columns.append(Column("parameter", "Key"))
     order = sorted(range(len(found.varied)), key=lambda place: -abs(found.strongest("conditions")[place]))
     rows: list[list[Cell]] = []
     for place in order:
         variation = found.varied[place]
-        value = "over speed" if variation.value is None else value_words(variation.key, variation.value)
+        value = "over speed" if variation.value is None else _value(variation)
         changes = [float(change) for over in _OVER for change in found.of_total(over)[place]]
         cells: list[Cell] = [None if math.isnan(change) else change for change in changes]
-        rows.append([variation.key, value, variation.origin, _per(variation), *cells])
-    caption = f"Change of the total at {result.prediction.surface}, by condition and helix angle"
+        words = number_words(variation.key, result.fleet)
+        rows.append([words, value, variation.origin, _per(variation), *cells, variation.key])
+    caption = f"Change of the total at {result.prediction.surface} by its slope, by condition and helix angle"
     return Table("sensitivity-total", caption, columns, rows, origin="calculated")
+
+
+def _value(variation: Variation) -> str:
+    unit = unit_of(variation.key)
+    return value_words(variation.key, variation.value) + (unit if unit == "°" else f" {unit}".rstrip())
 
 
 def _left_out(fleet: Fleet, found: Sensitivity) -> list[Block]:
@@ -139,6 +147,6 @@ def _left_out(fleet: Fleet, found: Sensitivity) -> list[Block]:
     if not by_reason:
         return []
     order = sorted(by_reason, key=lambda reason: (reason != VECTORS, reason != SILENT, reason))
-    rows: list[list[Cell]] = [[key, reason] for reason in order for key in by_reason[reason]]
-    columns = (Column("parameter", "Parameter"), Column("reason", "Why not"))
+    rows: list[list[Cell]] = [[number_words(key, fleet), reason, key] for reason in order for key in by_reason[reason]]
+    columns = (Column("words", "Parameter"), Column("reason", "Why not"), Column("parameter", "Key"))
     return [Details("Parameters not varied", [Table("not-varied", "Parameters not varied", columns, rows)])]

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
 
-from tdacoustic.drive.what_if import STEPS_DB, WhatIfAnswer, WhatIfLevel, off_name, step_name
-from tdacoustic.fleet import WhatIf
+from tdacoustic.drive.what_if import STEPS_DB, WhatIfAnswer, WhatIfLevel, most_off_db, off_name, step_name
+from tdacoustic.fleet import Fleet, WhatIf
 from tdacoustic.reporting.document import (
     Block,
     Cell,
@@ -24,8 +24,10 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Bars, Element, Figure, Markers
 from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.sections.parameters import keyed_words
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
+from tdacoustic.studies.words import unit_of
 
 __all__ = ["what_if_line", "what_if_of", "what_if_section"]
 
@@ -42,7 +44,7 @@ LITTLE_DB: Final = 1.0
 SMALLEST_DB: Final = 0.05
 """Changes that are none at the decimals shown."""
 
-ALONE: Final = "is all that sounds, each decibel less of it is one less at"
+ALONE: Final = "is all that sounds in the model, each decibel less of it is one less at"
 
 _GROUP: Final = 0.68
 """Part of a category that its bars take together, in both renderers."""
@@ -50,20 +52,27 @@ _GROUP: Final = 0.68
 
 def what_if_of(result: FleetPrediction) -> Section | None:
     """Return the section of a prediction; None where nothing was asked."""
-    return None if result.what_if is None else what_if_section(result.what_if)
+    return None if result.what_if is None else what_if_section(result.what_if, result.fleet)
 
 
-def what_if_section(answer: WhatIfAnswer) -> Section | None:
-    """Return the section on what changes of the drive do; None where it is silent throughout."""
+def what_if_section(answer: WhatIfAnswer, fleet: Fleet) -> Section | None:
+    """Return the section on what changes of the drive do; None where it is silent throughout.
+
+    Parameters
+    ----------
+    answer : WhatIfAnswer
+    fleet : Fleet
+        For its words.
+    """
     conditions = _conditions(answer)
     if not answer.paths or not conditions:
         return None
-    blocks: list[Block] = [Paragraph(_cases_words(answer))]
+    blocks: list[Block] = [Paragraph(_cases_words(answer, fleet)), Paragraph(_lines_words(answer))]
     blocks.append(Sentences([_condition_words(answer, levels) for levels in conditions]))
-    over = [text for text in (_first_words(answer, conditions), _little_words(answer, conditions)) if text]
+    over = [text for text in (_first_words(answer, conditions), *_little_words(answer, conditions)) if text]
     blocks += [Sentences(over)] if over else []
-    blocks.append(Paragraph(_interval_words(answer)))
-    blocks += [Notice("warning", text) for text in _open_words(answer)]
+    blocks.append(Paragraph(_interval_words(answer, fleet)))
+    blocks += [Notice("warning", text) for text in _open_words(answer, fleet)]
     figure = _figure(answer, conditions)
     blocks += [] if figure is None else [FigureBlock(figure, "calculated")]
     near = [level for levels in conditions for level in levels]
@@ -74,7 +83,7 @@ def what_if_section(answer: WhatIfAnswer) -> Section | None:
 
 
 def what_if_line(answer: WhatIfAnswer | None) -> str:
-    """Return the slowest and the fastest speed of the answer in a line of text; empty without one."""
+    """Return the slowest and the fastest speed of the answer in a line of text, and what it leaves out; or nothing."""
     conditions = [] if answer is None else _conditions(answer)
     if answer is None or not conditions or not answer.paths:
         return ""
@@ -89,7 +98,22 @@ def what_if_line(answer: WhatIfAnswer | None) -> str:
         )
         parts.append(f"at {levels[0].train_speed_km_h:.4g} km/h {said}")
     said = ". ".join([parts[0], *(sentence(part).rstrip(".") for part in parts[1:])])
-    return f"What if (level at {answer.surface}): {said}."
+    return f"What if (the model's level at {answer.surface}): {said}. {_lines_words(answer)}"
+
+
+def _lines_words(answer: WhatIfAnswer) -> str:
+    """What of the sound the model has, and so what of a recorded level can change."""
+    fractions = [fraction for _, fraction in answer.line_fractions]
+    if not fractions:
+        return "The model has lines alone: a recorded level, with broadband sound in it, changes by less."
+    ends = (min(fractions), max(fractions))
+    parts = " to ".join(dict.fromkeys(f"{100.0 * end:.0f}" for end in ends))
+    most = " to ".join(dict.fromkeys(f"{most_off_db(end):.1f}" for end in ends if end < 1.0))
+    text = f"The model has lines alone, which are {parts} % of the recorded sound energy"
+    if not most:
+        return f"{text}."
+    of_all = "" if len(fractions) == 1 else ", depending on the condition"
+    return f"{text}: as long as the rest stays, the recorded level falls by {most} dB at most{of_all}."
 
 
 def _conditions(answer: WhatIfAnswer) -> list[list[WhatIfLevel]]:
@@ -101,9 +125,9 @@ def _conditions(answer: WhatIfAnswer) -> list[list[WhatIfLevel]]:
     return sorted(found.values(), key=lambda levels: levels[0].train_speed_km_h)
 
 
-def _cases_words(answer: WhatIfAnswer) -> str:
+def _cases_words(answer: WhatIfAnswer, fleet: Fleet) -> str:
     if not answer.assumed:
-        cases = joined([f"{_quoted(case.name)} ({_case_words(case)})" for case in answer.cases])
+        cases = joined([f"{_quoted(case.name)} ({_case_words(case, fleet)})" for case in answer.cases])
         return f"The cases are those of the fleet's [[what_if]]: {cases}."
     steps = joined([f"{abs(step):g}" for step in STEPS_DB])
     return (
@@ -116,18 +140,23 @@ def _quoted(name: str) -> str:
     return f"\N{LEFT DOUBLE QUOTATION MARK}{name}\N{RIGHT DOUBLE QUOTATION MARK}"
 
 
-def _case_words(case: WhatIf) -> str:
+def _case_words(case: WhatIf, fleet: Fleet) -> str:
     """What a case changes."""
     changes = {path: case.gain_db(path) for path in case.stated_paths}
     parts = [f"{path} off" if change == -math.inf else f"{path} {change:+g} dB" for path, change in changes.items()]
-    parts += [f"{key} = {_value_words(value)}" for key, value in case.parameters]
+    parts += [f"{keyed_words(key, fleet)} = {_value_words(key, value)}" for key, value in case.parameters]
     only = "" if case.conditions is None else f", in {_names(case.conditions)} only"
     return pretty_signs(", ".join(parts)) + only
 
 
-def _value_words(value: Any) -> str:
+def _value_words(key: str, value: Any) -> str:
+    unit = unit_of(key)
+    return f"{_plain(value)}{unit if unit in ('', '°') else f' {unit}'}"
+
+
+def _plain(value: Any) -> str:
     if isinstance(value, tuple):
-        return f"[{', '.join(_value_words(entry) for entry in value)}]"
+        return f"[{', '.join(_plain(entry) for entry in value)}]"
     return f"{value:g}"
 
 
@@ -165,10 +194,10 @@ def _effects(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel], with_off: bool
     found = []
     for path in answer.paths:
         step = held[step_name(path, STEPS_DB[0])]
-        off = held[off_name(path)].change_db
+        off = held[off_name(path)]
         text = f"{abs(STEPS_DB[0]):g} dB less from {SOURCES[path]} {_effect(step)}"
-        if with_off and off is not None and (step.change_db or 0.0) - off >= SMALLEST_DB:
-            text += f", {-off:.1f} dB if it were silent"
+        if with_off and off.change_db is not None and (step.change_db or 0.0) - off.change_db >= SMALLEST_DB:
+            text += f", {_taken(off)} if it were silent"
         found.append(text)
     return found
 
@@ -179,15 +208,21 @@ def _effect(level: WhatIfLevel) -> str:
     if change is None:
         return "leaves nothing that sounds"
     low, high = (change, change) if ends is None else ends
-    if low < -SMALLEST_DB and high > SMALLEST_DB:
-        return pretty_signs(f"changes it by {change:+.1f} dB ({low:+.1f} to {high:+.1f})")
-    if abs(change) < SMALLEST_DB and max(-low, high) < SMALLEST_DB:
+    if low <= -SMALLEST_DB and high >= SMALLEST_DB:
+        about = f"{change:+.1f}" if abs(change) >= SMALLEST_DB else "0.0"
+        return pretty_signs(f"changes it by {about} dB ({low:+.1f} to {high:+.1f})")
+    if max(-low, high) < SMALLEST_DB:
         return "changes nothing"
-    rises = high > SMALLEST_DB
-    first, last = (low, high) if rises else (-high, -low)
-    between = [f"{abs(max(end, 0.0)):.1f}" for end in (first, last)]  # no "-0.0"
-    within = f" ({' to '.join(between)})" if len({*between, f"{abs(change):.1f}"}) > 1 else ""
-    return f"adds {abs(change):.1f} dB{within}" if rises else f"takes {abs(change):.1f} dB{within} off"
+    return f"adds {_taken(level, -1.0)}" if high >= SMALLEST_DB else f"takes {_taken(level)} off"
+
+
+def _taken(level: WhatIfLevel, sign: float = 1.0) -> str:
+    """What a change takes off, or with -1 adds, with its interval where that says more."""
+    assert level.change_db is not None  # asked by the caller
+    ends = level.change_95_db or (level.change_db, level.change_db)
+    between = [f"{abs(max(end, 0.0)):.1f}" for end in sorted(-sign * end for end in ends)]  # no "-0.0"
+    value = f"{abs(max(-sign * level.change_db, 0.0)):.1f}"
+    return f"{value} dB ({' to '.join(between)})" if {*between} != {value} else f"{value} dB"
 
 
 # ---------------------------------------------------------------- over the conditions
@@ -219,23 +254,35 @@ def _overlap(first: WhatIfLevel, second: WhatIfLevel) -> bool:
     return first.change_95_db[1] > second.change_95_db[0]
 
 
-def _little_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -> str:
-    """Where a source left out altogether takes next to nothing off, so that others come first; empty of nowhere."""
+def _little_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -> list[str]:
+    """Where a source left out altogether takes next to nothing off, and where only the intervals leave more open."""
     if not answer.assumed or len(answer.paths) < 2:
-        return ""
+        return []
     little: dict[str, list[str]] = {}
+    perhaps: dict[str, list[str]] = {}
+    most_db = 0.0
     for levels in conditions:
         held = {level.case: level for level in levels}
-        for path in answer.paths:
-            off = held[off_name(path)].change_db
-            if off is not None and -off < LITTLE_DB:
+        for path in answer.paths if _alone(answer, levels) is None else ():
+            off = held[off_name(path)]
+            if off.change_db is None or -off.change_db >= LITTLE_DB:
+                continue
+            at_most_db = -off.change_db if off.change_95_db is None else -off.change_95_db[0]
+            if at_most_db < LITTLE_DB:
                 little.setdefault(path, []).append(levels[0].condition)
-    if not little:
-        return ""
-    parts = [f"{SOURCES[path]} in {_names(names)}" for path, names in little.items()]
-    return sentence(
-        f"left out altogether, less than {LITTLE_DB:g} dB is gained from {joined(parts)}: others come first"
-    )
+            else:
+                perhaps.setdefault(path, []).append(levels[0].condition)
+                most_db = max(most_db, at_most_db)
+    start = f"Left out altogether, less than {LITTLE_DB:g} dB is gained from"
+    found = [f"{start} {_where_from(little)}: others come first."] if little else []
+    if perhaps:
+        most = f"up to {most_db:.1f} dB by the intervals"
+        found.append(f"{start} {_where_from(perhaps)} by the fitted values, but {most}.")
+    return found
+
+
+def _where_from(named: Mapping[str, Sequence[str]]) -> str:
+    return joined([f"{SOURCES[path]} in {_names(names)}" for path, names in named.items()])
 
 
 def _names(names: Sequence[str]) -> str:
@@ -245,7 +292,7 @@ def _names(names: Sequence[str]) -> str:
 # ---------------------------------------------------------------- how sure
 
 
-def _interval_words(answer: WhatIfAnswer) -> str:
+def _interval_words(answer: WhatIfAnswer, fleet: Fleet) -> str:
     basis = answer.basis
     if basis is None:
         return (
@@ -254,9 +301,8 @@ def _interval_words(answer: WhatIfAnswer) -> str:
         )
     method = "the range over" if basis.method == "profile" else "2.5 and 97.5 % quantiles over"
     how = "that the data allow (profile likelihood)" if basis.method == "profile" else "out of the posterior"
-    fitted = (
-        f"all values of {joined(basis.parameters)} {how}" if basis.parameters else "no parameter, as none was fitted"
-    )
+    keys = joined([keyed_words(key, fleet) for key in basis.parameters])
+    fitted = f"all values of {keys} {how}" if keys else "no parameter, as none was fitted"
     scatter = (
         f", together with the model's scatter of {basis.model_sigma_db:.2g} dB as an error of each source by itself in "
         "each condition [assumed]"
@@ -271,16 +317,18 @@ def _interval_words(answer: WhatIfAnswer) -> str:
     return (
         f"In brackets: intervals of 95 %, {method} {fitted}{scatter}.{alone} Not in them is what parameters that were "
         "not fitted are off by beyond that, sound that the model does not have, and whether a measure keeps what it "
-        "promises. Where a level was measured the change is to be added to it: the levels in the table are the model's."
+        "promises. The levels in the table are the model's; of a measured level a change holds as far as these lines "
+        "make it."
     )
 
 
-def _open_words(answer: WhatIfAnswer) -> list[str]:
+def _open_words(answer: WhatIfAnswer, fleet: Fleet) -> list[str]:
     held = () if answer.basis is None else answer.basis.open_parameters
     if not held:
         return []
     bounds = "their bounds hold" if len(held) > 1 else "its bounds hold"
-    return [f"The data do not determine {joined(held)}: {bounds} these intervals, as far as they depend on it."]
+    named = joined([keyed_words(key, fleet) for key in held])
+    return [f"The data do not determine {named}: {bounds} these intervals, as far as they depend on it."]
 
 
 # ---------------------------------------------------------------- figure and tables
