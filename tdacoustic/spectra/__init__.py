@@ -5,6 +5,7 @@ from tdacoustic.spectra.bands import BandPowers, ThirdOctaveMeter
 from tdacoustic.spectra.frames import FramePlan, plan_frames
 from tdacoustic.spectra.powers import FramePowerMeter, SegmentPowers
 from tdacoustic.spectra.spectrum import Spectrum, average_spectrum
+from tdacoustic.spectra.time_weighting import LevelHistory, LevelMeter
 from tdacoustic.spectra.weighting import a_weighting_db
 
 __all__ = [
@@ -12,6 +13,8 @@ __all__ = [
     "Correction",
     "FramePlan",
     "FramePowerMeter",
+    "LevelHistory",
+    "LevelMeter",
     "SegmentPowers",
     "Spectrum",
     "ThirdOctaveMeter",

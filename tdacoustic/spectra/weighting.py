@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["a_weighting_db"]
+__all__ = ["A_POLES_HZ", "a_weighting_db"]
 
-_F1_HZ, _F2_HZ, _F3_HZ, _F4_HZ = 20.598997, 107.65265, 737.86223, 12194.217
+A_POLES_HZ = _F1_HZ, _F2_HZ, _F3_HZ, _F4_HZ = (20.598997, 107.65265, 737.86223, 12194.217)
 """Pole frequencies of the A curve (IEC 61672-1:2013, 5.4.6 and Annex E)."""
 
 
