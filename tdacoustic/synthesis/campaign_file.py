@@ -71,7 +71,7 @@ def campaign_toml(recipe: Recipe, runs: list[tuple[RunPlan, str]], recipe_name: 
 def _channel(channel: ChannelRecipe) -> dict[str, Any]:
     keys: dict[str, Any] = {"name": channel.name}
     keys |= {key: getattr(channel, key) for key in (*_CHANNEL_KEYS, *_CHANNEL_KEYS_AFTER)}
-    if not channel.is_signal:
+    if not channel.is_signal and channel.shaft != "train":
         keys["shaft"] = channel.shaft
     if channel.quantity == "tacho":
         keys["pulses_per_rev"] = channel.pulses_per_rev

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.synthesis.recipe import ChannelRecipe
+from tdacoustic.synthesis.recipe import ChannelRecipe, Resonance
 
-__all__ = ["coloured_noise", "delayed", "floor_density"]
+__all__ = ["coloured_noise", "delayed", "floor_density", "resonance_gain", "resonant"]
 
 
 def floor_density(channel: ChannelRecipe, frequency_hz: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,6 +47,26 @@ def coloured_noise(
     frequency = np.asarray(np.fft.rfftfreq(n_samples, 1.0 / sample_rate_hz), dtype=np.float64)
     density = floor_density(channel, frequency)
     return np.fft.irfft(white * np.sqrt(0.5 * sample_rate_hz * density), n_samples)
+
+
+def resonance_gain(resonances: Sequence[Resonance], frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Return the factor of a channel's resonances, one after the other: 1 + (g - 1) j w f / (f0² - f² + j w f)."""
+    factor = np.ones(np.shape(frequency_hz), dtype=np.complex128)
+    for item in resonances:
+        damped = 1j * item.width_hz * frequency_hz
+        top = 10.0 ** (item.height_db / 20.0) - 1.0
+        factor *= 1.0 + top * damped / (item.frequency_hz**2 - frequency_hz**2 + damped)
+    return factor
+
+
+def resonant(
+    signal: NDArray[np.float64], resonances: Sequence[Resonance], sample_rate_hz: float
+) -> NDArray[np.float64]:
+    """Send a signal of shape (n,) through a channel's resonances; its end rings on into its beginning."""
+    if not resonances:
+        return signal
+    frequency = np.asarray(np.fft.rfftfreq(signal.size, 1.0 / sample_rate_hz), dtype=np.float64)
+    return np.fft.irfft(np.fft.rfft(signal) * resonance_gain(resonances, frequency), signal.size)
 
 
 def delayed(signal: NDArray[np.float64], sample_rate_hz: float, delay_s: float) -> NDArray[np.float64]:

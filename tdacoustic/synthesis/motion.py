@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import RecipeError
-from tdacoustic.synthesis.recipe import Kinematics, LineRecipe
+from tdacoustic.synthesis.recipe import Kinematics, LineRecipe, Slip
 
 __all__ = ["Motion", "slow_noise"]
 
@@ -63,13 +64,14 @@ class Motion:
         end_km_h: float | None,
         profile: str,
         mesh_excess: float,
+        slip: Sequence[Slip] = (),
         rng: np.random.Generator,
     ) -> Motion:
         """Make a motion of constant or running speed.
 
         The wander has exactly the relative rms that the recipe prescribes and averages to zero, so the mean speed of a
-        steady run is the nominal one. The angle is integrated by the trapezoidal rule, whose error is below 1e-6
-        revolutions for wander below 10 Hz.
+        steady run is the nominal one; a slip on top of it rises and falls as a squared sine. The angle is integrated by
+        the trapezoidal rule, whose error is below 1e-6 revolutions for wander below 10 Hz.
         """
         time_s = np.arange(n_samples) / sample_rate_hz
         part = time_s * sample_rate_hz / max(n_samples - 1, 1)
@@ -80,6 +82,9 @@ class Motion:
         if kinematics.speed_wander > 0.0:
             wander = slow_noise(rng, n_samples, sample_rate_hz, kinematics.wander_bandwidth_hz).real
             speed = speed * (1.0 + kinematics.speed_wander * wander / np.sqrt(np.mean(wander**2)))
+        for event in slip:
+            within = np.clip((time_s - event.from_s) / (event.to_s - event.from_s), 0.0, 1.0)
+            speed = speed * (1.0 + event.peak * np.sin(np.pi * within) ** 2)
         turns = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]))]) / sample_rate_hz
         return cls(kinematics, time_s, nominal, speed, turns, mesh_excess)
 

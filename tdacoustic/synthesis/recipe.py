@@ -82,12 +82,39 @@ class Hump(_Strict):
     height_db: Annotated[float, Field(gt=0, le=80)]
 
 
+class Resonance(_Strict):
+    """A resonance that all of a channel passes: a filter of one degree of freedom.
+
+    It is 0 dB far away and `height_db` at its top; `width_hz` is the half-power width of the part above 1.
+    """
+
+    frequency_hz: Positive
+    width_hz: Positive
+    height_db: Annotated[float, Field(gt=0, le=60)]
+
+
+class Slip(_Strict):
+    """A loss of adhesion: the shafts run ahead by up to `peak` of their speed, or fall behind where it is negative."""
+
+    from_s: Annotated[float, Field(ge=0)]
+    to_s: Positive
+    peak: Annotated[float, Field(gt=-0.9, le=2.0)]
+
+    @model_validator(mode="after")
+    def _rises(self) -> Slip:
+        if self.to_s <= self.from_s:
+            raise ValueError(f"to_s must lie after from_s, got {self.from_s:g} and {self.to_s:g}")
+        return self
+
+
 class ChannelRecipe(_Strict):
     """One channel of the logs.
 
     `floor` is the channel's own broadband: points (Hz, dB re the quantity's reference, per Hz), straight lines between
     them over log frequency, the end values beyond. `gain_db` is what this sensor reads above all that the recipe says
-    (a livelier spot). `bits` overrides the campaign's.
+    (a livelier spot). `resonance` shapes all that the channel holds, and what paths lead on from it where the channel
+    is its component's first. A speed channel tells the turns of its shaft in rpm, or with ``shaft = "train"`` the
+    train's speed in km/h, without any slip. `bits` overrides the campaign's.
     """
 
     name: Name
@@ -105,7 +132,8 @@ class ChannelRecipe(_Strict):
     gain_db: Finite = 0.0
     floor: list[tuple[Positive, Finite]] = []
     hump: list[Hump] = []
-    shaft: Literal["motor", "wheelset"] = "motor"
+    resonance: list[Resonance] = []
+    shaft: Literal["motor", "wheelset", "train"] = "motor"
     pulses_per_rev: Annotated[int, Field(ge=1)] | None = None
     pulse_height_v: Positive = 5.0
     pulse_rise_s: Positive | None = None
@@ -127,7 +155,7 @@ class ChannelRecipe(_Strict):
     @property
     def stored_unit(self) -> str:
         """Unit that the log states."""
-        return _UNITS[self.quantity]
+        return "km/h" if self.quantity == "speed" and self.shaft == "train" else _UNITS[self.quantity]
 
     @model_validator(mode="after")
     def _fits_its_quantity(self) -> ChannelRecipe:
@@ -138,8 +166,12 @@ class ChannelRecipe(_Strict):
         frequencies = [point[0] for point in self.floor]
         if any(after <= before for before, after in itertools.pairwise(frequencies)):
             raise ValueError(f"the frequencies of floor must rise, got {frequencies}")
-        if not self.is_signal and (self.floor or self.hump or self.gain_db):
-            raise ValueError(f"floor, hump and gain_db are for vibration and sound, not for a {self.quantity} channel")
+        if not self.is_signal and (self.floor or self.hump or self.resonance or self.gain_db):
+            raise ValueError(
+                f"floor, hump, resonance and gain_db are for vibration and sound, not for a {self.quantity} channel"
+            )
+        if self.shaft == "train" and self.quantity != "speed":
+            raise ValueError(f"shaft = 'train' is of a speed channel, not of a {self.quantity} channel")
         if self.quantity == "tacho" and self.pulses_per_rev is None:
             raise ValueError("pulses_per_rev is missing")
         if self.decimation != 1 and self.quantity != "speed":
@@ -205,12 +237,14 @@ class ConditionRecipe(_Strict):
     With `train_speed_end_km_h` the speed runs from one to the other over the run. `level_db` prescribes the overall
     unweighted level of channels within ``level_band_hz``: the broadband is scaled to it, or, where `line_fraction`
     is given too, the lines to that part of the energy and the broadband to the rest. `floor_gain_db` shifts floors.
+    `slip` lets the shafts run ahead of the train for a while.
     """
 
     name: Name
     train_speed_km_h: Annotated[float, Field(ge=0)]
     train_speed_end_km_h: Positive | None = None
     speed_profile: Literal["linear", "smooth"] = "linear"
+    slip: list[Slip] = []
     duration_s: Positive | None = None
     mesh_excess: Annotated[float, Field(ge=-0.05, le=0.05)] | None = None
     carrier_hz: Positive | None = None

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import RecipeError
 from tdacoustic.synthesis.chance import generator
-from tdacoustic.synthesis.floors import coloured_noise, delayed, floor_density
+from tdacoustic.synthesis.floors import coloured_noise, delayed, floor_density, resonance_gain, resonant
 from tdacoustic.synthesis.lines import LinePart, PlacedLine, place_line, waveform
 from tdacoustic.synthesis.motion import Motion
 from tdacoustic.synthesis.pulses import TachoPulses, tacho_pulses
@@ -70,8 +70,9 @@ class ChannelSignal:
         total = self.floor_gain**2 * floor_density(channel, frequency_hz)
         by_name = {other.name: other for other in recipe.signal_channels}
         for name, factor in self.path_floors:
-            total = total + factor**2 * floor_density(by_name[name], frequency_hz)
-        return total
+            led = np.abs(resonance_gain(by_name[name].resonance, np.asarray(frequency_hz))) ** 2
+            total = total + factor**2 * led * floor_density(by_name[name], frequency_hz)
+        return np.asarray(total * np.abs(resonance_gain(channel.resonance, np.asarray(frequency_hz))) ** 2)
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ class SyntheticRun:
             return self.channels[channel.name].signal
         if channel.quantity == "tacho":
             return self.tachos[channel.name].voltage_v
+        if channel.shaft == "train":
+            return self.motion.nominal_km_h[:: channel.decimation]
         speed = 60.0 * self.motion.motor_speed_hz * self.motion.shaft_ratio(channel.shaft)
         return speed[:: channel.decimation]
 
@@ -140,7 +143,7 @@ def make_run(recipe: Recipe, plan: RunPlan, seed: int) -> SyntheticRun:
     -----
     The drive is linear here: a channel is the sum of its own floor, of what the paths bring of other channels' floors,
     and of its lines. Neglected: modulation of lines, structure between neighbouring channels of one component beyond
-    common lines, and any change of the floor within a run.
+    common lines, and any change of the floor within a run. A channel's resonances filter the whole run.
     """
     condition = plan.condition
     n_samples = round((condition.duration_s or recipe.duration_s) * recipe.sample_rate_hz)
@@ -155,6 +158,7 @@ def make_run(recipe: Recipe, plan: RunPlan, seed: int) -> SyntheticRun:
         end_km_h=condition.train_speed_end_km_h,
         profile=condition.speed_profile,
         mesh_excess=excess,
+        slip=condition.slip,
         rng=generator(seed, plan.name, "wander"),
     )
     placed = tuple(
@@ -214,6 +218,7 @@ def _scatter_db(seed: int, plan: RunPlan, what: str) -> float:
 
 
 def _own_floor(recipe: Recipe, channel: ChannelRecipe, plan: RunPlan, n_samples: int, seed: int) -> NDArray:
+    """Without the channel's own resonances."""
     return coloured_noise(generator(seed, plan.name, channel.name, "floor"), channel, n_samples, recipe.sample_rate_hz)
 
 
@@ -240,15 +245,22 @@ class _Mixer:
             gain *= channel.reference / source.reference
             rng = generator(seed, plan.name, channel.name, path.source, "floor by path")
             rest = coloured_noise(rng, source, self._floor.size, recipe.sample_rate_hz)
-            common = delayed(own_floors[source.name], recipe.sample_rate_hz, path.delay_s)
+            rest = resonant(rest, source.resonance, recipe.sample_rate_hz)
+            led = resonant(own_floors[source.name], source.resonance, recipe.sample_rate_hz)
+            common = delayed(led, recipe.sample_rate_hz, path.delay_s)
             self._floor = self._floor + gain * (np.sqrt(path.coherence) * common + np.sqrt(1.0 - path.coherence) * rest)
             self._path_floors.append((source.name, gain))
+        self._floor = resonant(self._floor, channel.resonance, recipe.sample_rate_hz)
         self._with_floor = np.zeros_like(self._floor)
         self._lines = np.zeros_like(self._floor)
         self._parts: dict[str, tuple[NDArray, bool, list[str]]] = {}
 
     def add(self, name: str, wave: NDArray, part: LinePart) -> None:
         """Add one line's part."""
+        shapes = list(self._channel.resonance)
+        if part.path is not None:
+            shapes += self._recipe.targets(part.path.source)[0].resonance
+        wave = resonant(wave, shapes, self._recipe.sample_rate_hz)
         via = "recipe" if part.path is None else f"path from {part.path.source}"
         before, _, ways = self._parts.get(name, (np.zeros_like(wave), part.follows_floor, []))
         self._parts[name] = (before + wave, part.follows_floor, [*ways, via])

@@ -317,3 +317,53 @@ def test_a_path_turns_a_moving_line_by_its_delay(base):
         phases.append(np.angle(target / source))
     slope = np.polyfit(frequency, np.unwrap(phases), 1)[0]
     assert -slope / (2 * np.pi) == pytest.approx(0.003, rel=1e-3)
+
+
+def test_a_resonance_lifts_a_line_that_passes_it(base):
+    """By `height_db` at its top and by half the power of the lifted part at half its width, measured over the speed."""
+    base["channel"][1]["resonance"] = [{"frequency_hz": 400.0, "width_hz": 40.0, "height_db": 14.0}]
+    base["condition"][0] |= {"train_speed_end_km_h": 60, "duration_s": 60.0}
+    base["condition"][0]["line"] = [{"source": "gearbox", "mesh": 1, "level_db": {"gearbox_z": 120.0}}]
+    _, run = one_run(quiet(base))
+    (line,) = run.lines
+    envelope = 2.0 * np.abs(np.convolve(run.channels["gearbox_z"].signal * np.exp(-2j * np.pi * line.turns), WINDOW))
+    envelope = envelope[WINDOW.size // 2 :][: line.turns.size] / np.sqrt(2.0) / 1e-6
+    for frequency, gain in ((400.0, 5.0118723), (390.0, abs(1 + 4.0118723 * 15600j / (160000 - 152100 + 15600j)))):
+        at = int(np.argmin(np.abs(line.frequency_hz - frequency)))
+        # A sweep of 3 Hz/s through 40 Hz: the top of a linear resonance is lower and later by far less than 0.1 dB.
+        assert db(envelope[at]) == pytest.approx(120.0 + db(gain), abs=0.1)
+
+
+WINDOW = np.hanning(1025) / np.hanning(1025).sum()
+
+
+def test_a_slip_is_seen_by_the_shaft_and_not_by_the_train(base):
+    base["channel"] += [
+        {"name": "shaft", "quantity": "speed", "component": "shaft"},
+        {"name": "train", "quantity": "speed", "component": "shaft", "shaft": "train"},
+    ]
+    base["condition"][0]["slip"] = [{"from_s": 2.0, "to_s": 4.0, "peak": 0.1}]
+    recipe, run = one_run(base)
+    channels = {channel.name: channel for channel in recipe.channel}
+    assert channels["train"].stored_unit == "km/h"
+    train, shaft = run.samples(recipe, channels["train"]), run.samples(recipe, channels["shaft"]) / 60.0
+    assert np.allclose(train, 40.0)
+    slip = shaft / MOTOR_HZ_AT_40 - 1.0
+    assert slip[int(3.0 * RATE)] == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(slip[: int(2.0 * RATE)]).max() < 1e-9 and np.abs(slip[int(4.0 * RATE) + 1 :]).max() < 1e-9
+    assert run.motion.motor_turns[-1] - 8.0 * MOTOR_HZ_AT_40 == pytest.approx(0.1 * MOTOR_HZ_AT_40, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"channel": {"resonance": [{"frequency_hz": 1, "width_hz": 1, "height_db": 3}]}}, "hump, resonance and gain"),
+        ({"channel": {"shaft": "train"}}, "shaft = 'train' is of a speed channel, not of a tacho channel"),
+        ({"slip": [{"from_s": 2.0, "to_s": 2.0, "peak": 0.1}]}, "to_s must lie after from_s"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(base, changed, words):
+    base["channel"][3] |= changed.pop("channel", {})
+    base["condition"][0] |= changed
+    with pytest.raises(RecipeError, match=words):
+        parse_recipe(base)
