@@ -76,11 +76,13 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float, int], None] | None]
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)
 
 
-def _analysed(campaign: Path | LoadedCampaign, store: Path | None, jobs: int | None, quiet: bool) -> Analysis:
+def _analysed(
+    campaign: Path | LoadedCampaign, store: Path | None, jobs: int | None, quiet: bool, *, deeper: bool = True
+) -> Analysis:
     from tdacoustic.workflows.analyze import analyze
 
     with _progress(quiet) as progress:
-        return analyze(campaign, store, jobs, progress)
+        return analyze(campaign, store, jobs, progress, deeper=deeper)
 
 
 def _toml(campaign: Path) -> Path:
@@ -155,7 +157,7 @@ def check(
     from tdacoustic.workflows.output import default_output
     from tdacoustic.workflows.write import write_check
 
-    analysis = _analysed(campaign, store, jobs, quiet)
+    analysis = _analysed(campaign, store, jobs, quiet, deeper=False)
     write_check(analysis, out or default_output(_toml(campaign)), _toml(campaign), overwrite)
     table = analysis.tables["quality"]
     if not quiet:

@@ -36,15 +36,17 @@ ALLOWED = {
     "drive": "cavity housing radiation motor gears spectra fleet steps units errors",
     "studies": "drive housing radiation gears fleet toml_models steps errors",
     "fitting": "drive radiation motor gears fleet steps units errors",
-    "measured": "quality lines spectra speed recording formats ingest campaign steps units errors",
-    "attribution": "measured quality lines spectra speed campaign fleet steps units errors",
-    "results": "studies fitting drive attribution measured campaign fleet spectra steps errors",
-    "tables": "studies drive gears attribution measured campaign fleet units errors",
-    "reporting": "studies results tables fitting drive gears attribution measured campaign fleet quality lines spectra "
-    "speed recording units errors __version__",
+    "measured": "contributions orders tones quality lines spectra speed recording formats ingest campaign steps units "
+    "errors",
+    "attribution": "measured contributions orders quality lines spectra speed campaign fleet steps units errors",
+    "results": "studies fitting drive attribution measured contributions railway campaign fleet spectra steps errors",
+    "tables": "studies drive gears attribution measured contributions orders tones railway speed campaign fleet units "
+    "errors",
+    "reporting": "studies results tables fitting drive gears attribution measured contributions orders tones railway "
+    "campaign fleet quality lines spectra speed recording units errors __version__",
     "synthesis": "errors",
-    "workflows": "studies reporting tables results fitting drive gears attribution measured steps quality lines "
-    "spectra speed ingest campaign fleet toml_models formats recording units errors",
+    "workflows": "studies reporting tables results fitting drive gears attribution measured contributions orders tones "
+    "railway steps quality lines spectra speed ingest campaign fleet toml_models formats recording units errors",
     "cli": "workflows synthesis results campaign fleet errors __version__",
     "__main__": "cli",
     "__init__": "",

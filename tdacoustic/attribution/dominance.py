@@ -10,7 +10,7 @@ import numpy as np
 from tdacoustic.attribution.judgement import Draws
 from tdacoustic.attribution.sources import SourceLine
 
-__all__ = ["DECIDED", "Dominance", "dominance_of_condition"]
+__all__ = ["DECIDED", "Dominance", "dominance_of_condition", "largest_sources"]
 
 DECIDED = 0.9
 """Confidence below which the word is ``undecided``."""
@@ -122,7 +122,19 @@ def _excitation(sources: Sequence[SourceLine]) -> str | None:
 
 
 def _leading(sources: Sequence[SourceLine], draws: Draws) -> tuple[str | None, float | None]:
-    """Return the source that is largest most often, and how often; shares averaged over receivers in each draw."""
+    """Return the source that is largest most often, and how often."""
+    return max(largest_sources(sources, draws).items(), key=lambda item: item[1])
+
+
+def largest_sources(sources: Sequence[SourceLine], draws: Draws) -> dict[str, float]:
+    """Return how often each source is the largest; shares averaged over receivers in each draw.
+
+    Parameters
+    ----------
+    sources : sequence of SourceLine
+    draws : Draws
+        Of the same lines.
+    """
     totals = np.zeros((len(draws.sources), draws.energy.shape[1]))
     for receiver in dict.fromkeys(source.line.channel for source in sources):
         rows = [index for index, source in enumerate(sources) if source.line.channel == receiver]
@@ -131,5 +143,4 @@ def _leading(sources: Sequence[SourceLine], draws: Draws) -> tuple[str | None, f
         for number in range(len(draws.sources)):
             totals[number] += np.where(draws.source[rows] == number, energy, 0.0).sum(axis=0) / whole
     largest = np.bincount(totals.argmax(axis=0), minlength=len(draws.sources))
-    leading = int(largest.argmax())
-    return draws.sources[leading], float(largest[leading] / largest.sum())
+    return {name: float(count / largest.sum()) for name, count in zip(draws.sources, largest, strict=True)}

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from tdacoustic.attribution.excitation import Expected, Scale, observed_scale, refined
 from tdacoustic.fleet import Kinematics
 from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.speed import relative_excess
 
 __all__ = ["RunKinematics", "run_kinematics"]
 
@@ -17,6 +20,9 @@ MEASURED_ERROR = 1e-3
 """The same from a speed channel [assumed: its scale]."""
 SCATTER_PART = 0.15
 """Part of the speed's scatter by which the mean over a line's frames may miss the mean speed [tests/evidence: 0.11]."""
+LINES_ERROR = 2.5e-4
+"""The same from lines, at least [tests/evidence/tacholess_record.json: median of the rms errors of run-ups]."""
+_OWN_ERRORS = {"tacho": TACHO_ERROR, "channel": MEASURED_ERROR, "lines": LINES_ERROR}
 STATED_ERROR = 5e-3
 """The same of a stated train speed [assumed: the paper's mesh lines lie 0 to 1.4 % beside the calculated ones]."""
 MESH_REACH = 0.016
@@ -70,7 +76,7 @@ class RunKinematics:
     @property
     def excess(self) -> float | None:
         """Observed over calculated mesh, minus one."""
-        return None if self.observed_mesh_hz is None else self.observed_mesh_hz / self.mesh_hz - 1.0
+        return None if self.observed_mesh_hz is None else relative_excess(self.observed_mesh_hz, self.mesh_hz)
 
 
 def run_kinematics(run: MeasuredRun, drive: Kinematics) -> RunKinematics | None:
@@ -125,10 +131,13 @@ def run_kinematics(run: MeasuredRun, drive: Kinematics) -> RunKinematics | None:
 
 def _measured_error(run: MeasuredRun) -> float:
     """Relative error of a measured mean speed, a part of its scatter included."""
-    assert run.measurement is not None and run.recording is not None
+    assert run.measurement is not None
     profile = run.measurement.speed.leading
-    counted = profile is not None and run.recording[profile.channel].quantity == "tacho"
-    return (TACHO_ERROR if counted else MEASURED_ERROR) + SCATTER_PART * run.measurement.speed.scatter
+    own = MEASURED_ERROR if profile is None else _OWN_ERRORS[profile.source]
+    if profile is not None and profile.source == "lines" and profile.error is not None and profile.mean:
+        # Values of neighbouring frames are not independent: what is theirs is the mean's.
+        own = max(own, float(np.median(profile.error)) / abs(profile.mean))
+    return own + SCATTER_PART * run.measurement.speed.scatter
 
 
 def _measured_motor_hz(run: MeasuredRun, drive: Kinematics) -> tuple[float | None, str]:
@@ -136,12 +145,16 @@ def _measured_motor_hz(run: MeasuredRun, drive: Kinematics) -> tuple[float | Non
     profile = run.measurement.speed.leading
     if profile is None:
         return None, ""
+    mean = abs(profile.mean)  # a shaft that turns backwards has the same orders
     if profile.si_symbol == "m/s":
-        return drive.motor_hz(profile.mean), f"train speed, channel {profile.channel}"
+        return drive.motor_hz(mean), f"train speed, channel {profile.channel}"
+    if profile.source == "lines":
+        sure = "" if profile.confidence is None else f", confidence {float(np.median(profile.confidence)):.2f}"
+        return mean, f"{profile.channel}{sure}"
     if profile.shaft == "motor":
-        return profile.mean, f"motor shaft, channel {profile.channel}"
+        return mean, f"motor shaft, channel {profile.channel}"
     if profile.shaft == "wheelset":
-        return drive.motor_hz_of_wheel(profile.mean), f"wheelset, channel {profile.channel}"
+        return drive.motor_hz_of_wheel(mean), f"wheelset, channel {profile.channel}"
     return None, ""
 
 

@@ -5,6 +5,7 @@ from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.load import load_campaign
 from tdacoustic.campaign.model import SCHEMA, Campaign
+from tdacoustic.campaign.railway import RailwaySettings
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.scale import Scale
 from tdacoustic.campaign.settings import AnalysisSettings
@@ -23,6 +24,7 @@ __all__ = [
     "Level",
     "LevelKind",
     "Override",
+    "RailwaySettings",
     "Scale",
     "WrittenPath",
     "legal_name",

@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
+from tdacoustic.campaign.railway import Place, place_problem
 from tdacoustic.campaign.scale import Scale, full_scale_of
 from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text
 from tdacoustic.units import parse_sensitivity, parse_unit
@@ -91,6 +92,13 @@ class CampaignChannel(Table):
         Of a microphone from the drive's centre.
     height_above_rail_m : float or None
     side : str or None
+    place : str or None
+        Where a microphone is, for the railway standards: ``"wayside"``, ``"vehicle"`` or ``"interior"``. Of a wayside
+        one `distance_m` counts from the track's centreline, along which the drive's centre passes.
+    height_above_floor_m : float or None
+        Of a microphone inside.
+    stands_for_m : float or None
+        Length of a standing unit that a wayside microphone stands for.
     shaft : str or None
         ``"motor"`` or ``"wheelset"``, of a speed or a tacho.
     pulses_per_rev : float or None
@@ -112,6 +120,9 @@ class CampaignChannel(Table):
     distance_m: NonNegative | None = None
     height_above_rail_m: float | None = None
     side: Text | None = None
+    place: Place | None = None
+    height_above_floor_m: NonNegative | None = None
+    stands_for_m: Positive | None = None
     shaft: Literal["motor", "wheelset"] | None = None
     pulses_per_rev: Positive | None = None
 
@@ -141,6 +152,9 @@ class CampaignChannel(Table):
             raise ValueError(f"role {self.role!r} is of a microphone, but quantity is {self.quantity!r}")
         scale = self.scale
         scale.check()
+        misplaced = place_problem(self, scale.stated_quantity())
+        if misplaced is not None:
+            raise ValueError(misplaced)
         if self.component is None and scale.stated_quantity() == "sound_pressure":
             object.__setattr__(self, "component", "air")
         return self

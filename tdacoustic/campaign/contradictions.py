@@ -7,6 +7,7 @@ from typing import Final
 
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.model import Campaign
+from tdacoustic.campaign.railway import railway_contradictions
 from tdacoustic.campaign.runs import CampaignRun
 
 __all__ = ["MAX_SPEED_RATIO", "contradictions"]
@@ -34,6 +35,7 @@ def contradictions(campaign: Campaign) -> tuple[str, ...]:
         *_channel_contradictions(campaign.channels),
         *_run_contradictions(campaign.runs),
         *_speed_contradictions(campaign),
+        *railway_contradictions(campaign.channels, campaign.runs, campaign.railway),
         *_level_contradictions(campaign),
         *_judgement_contradictions(campaign),
     )

@@ -79,6 +79,7 @@ def load_campaign(path: str | Path) -> Campaign:
         overrides=file.override,
         analysis=file.analysis,
         calibration=file.calibration,
+        railway=file.railway,
     )
     problems = contradictions(campaign)
     if problems:

@@ -14,6 +14,7 @@ from tdacoustic.campaign.calibration import CalibrationParameter, CalibrationSet
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
 from tdacoustic.campaign.model import CampaignFile
+from tdacoustic.campaign.railway import RailwaySettings
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.settings import AnalysisSettings
 from tdacoustic.errors import CampaignError
@@ -25,7 +26,7 @@ _ARRAYS: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
     {"channel": CampaignChannel, "run": CampaignRun, "level": Level, "exclude": Exclude, "override": Override}
 )
 _TABLES: Final[Mapping[str, type[BaseModel]]] = MappingProxyType(
-    {"analysis": AnalysisSettings, "calibration": CalibrationSettings}
+    {"analysis": AnalysisSettings, "calibration": CalibrationSettings, "railway": RailwaySettings}
 )
 
 _PARAMETER: Final = "[[calibration.parameter]]"

@@ -11,6 +11,7 @@ from pydantic import Field
 from tdacoustic.campaign.calibration import CalibrationSettings
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.judgements import Exclude, Level, Override
+from tdacoustic.campaign.railway import RailwaySettings
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.settings import AnalysisSettings
 from tdacoustic.campaign.values import StatedPath, WrittenPath
@@ -41,6 +42,7 @@ class CampaignFile(Table):
     override: tuple[Override, ...] = ()
     analysis: AnalysisSettings = AnalysisSettings()
     calibration: CalibrationSettings = CalibrationSettings()
+    railway: RailwaySettings | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,8 @@ class Campaign:
     overrides : tuple of Override
     analysis : AnalysisSettings
     calibration : CalibrationSettings
+    railway : RailwaySettings or None
+        None where the file has no such table.
     """
 
     path: Path
@@ -84,11 +88,18 @@ class Campaign:
     overrides: tuple[Override, ...] = ()
     analysis: AnalysisSettings = field(default_factory=AnalysisSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
+    railway: RailwaySettings | None = None
 
     @property
     def folder(self) -> Path:
         """The folder that paths of the campaign are relative to."""
         return self.path.parent
+
+    @property
+    def asks_for_railway(self) -> bool:
+        """Whether a key of the railway standards stands in the file; without any, nothing is done about them."""
+        placed = any(channel.place is not None for channel in self.channels)
+        return self.railway is not None or placed or any(run.test is not None for run in self.runs)
 
     def test_runs(self) -> tuple[CampaignRun, ...]:
         """Runs of kind ``test``, rejected ones too."""
@@ -134,6 +145,8 @@ class Campaign:
     def settings(self) -> dict[str, Any]:
         """Every setting with its value, under keys such as ``analysis.overlap``, for the report."""
         tables: dict[str, Table] = {"analysis": self.analysis, "calibration": self.calibration}
+        if self.asks_for_railway:
+            tables["railway"] = self.railway or RailwaySettings()
         return {f"{name}.{key}": _plain(value) for name, table in tables.items() for key, value in table}
 
 

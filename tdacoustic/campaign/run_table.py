@@ -13,7 +13,7 @@ from tdacoustic.errors import CampaignError, MissingFileError
 
 __all__ = ["read_run_table"]
 
-_TEXT_COLUMNS: Final = frozenset({"name", "condition", "kind", "mode", "direction", "reject_reason"})
+_TEXT_COLUMNS: Final = frozenset({"name", "condition", "kind", "mode", "direction", "test", "reject_reason"})
 _BOOLEANS: Final = {"true": True, "false": False}
 
 

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from tdacoustic.campaign.railway import RailwayTest, passage_problem
 from tdacoustic.campaign.values import StatedPath
 from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text
 
@@ -43,12 +44,20 @@ class CampaignRun(Table):
     oil_temperature_degc : float or None
     train_speed_km_h, motor_speed_rpm : float or None
         Magnitudes; absent where a speed or tacho channel says it.
+    start_train_speed_km_h, start_motor_speed_rpm : float or None
+        Of a run-up or a coast-down whose speed no channel says: the speed at its start, from which on it is sought in
+        the lines of vibration. At most one of both.
     logs : tuple of WrittenPath
         At least one.
     sample_rate_hz : float or None
         Only where the log does not say.
     start_s, end_s : float or None
         Cut, from the run's common start.
+    test : str or None
+        What a railway standard calls the run: ``"pass-by"``, ``"stationary"``, ``"starting"``, ``"braking"`` or
+        ``"constant-speed"``.
+    front_s, middle_s, rear_s : float or None
+        Of a pass-by: when the unit's front, middle and rear are opposite the microphone, from the run's common start.
     valid : bool
     reject_reason : str or None
         Of a run that is not valid.
@@ -64,10 +73,16 @@ class CampaignRun(Table):
     oil_temperature_degc: Annotated[float, Field(ge=-273.15)] | None = None
     train_speed_km_h: NonNegative | None = None
     motor_speed_rpm: NonNegative | None = None
+    start_train_speed_km_h: NonNegative | None = None
+    start_motor_speed_rpm: NonNegative | None = None
     logs: Annotated[tuple[StatedPath, ...], Field(min_length=1)]
     sample_rate_hz: Positive | None = None
     start_s: float | None = None
     end_s: float | None = None
+    test: RailwayTest | None = None
+    front_s: float | None = None
+    middle_s: float | None = None
+    rear_s: float | None = None
     valid: bool = True
     reject_reason: Text | None = None
 
@@ -82,11 +97,26 @@ class CampaignRun(Table):
             raise ValueError("valid = false needs a reject_reason, which is missing")
         if self.valid and self.reject_reason is not None:
             raise ValueError(f"reject_reason {self.reject_reason!r} stands beside valid = true; set valid = false")
+        self._one_speed()
+        problem = passage_problem(self)
+        if problem is not None:
+            raise ValueError(problem)
         written = [log.text for log in self.logs]
         for text, count in Counter(str(log.path) for log in self.logs).items():
             if count > 1:
                 raise ValueError(f"logs names {text!r} {count} times, got {written}")
         return self
+
+    def _one_speed(self) -> None:
+        """Raise where a start is stated twice, or beside a speed that holds for the whole run."""
+        starts = [key for key in ("start_train_speed_km_h", "start_motor_speed_rpm") if getattr(self, key) is not None]
+        held = [key for key in ("train_speed_km_h", "motor_speed_rpm") if getattr(self, key) is not None]
+        if len(starts) > 1:
+            raise ValueError(f"{' and '.join(starts)} are both given; leave one out")
+        if starts and held:
+            raise ValueError(
+                f"{starts[0]} is of a run whose speed changes, but {held[0]} states one for all of it; leave one out"
+            )
 
 
 def _default_name(run: CampaignRun) -> str:

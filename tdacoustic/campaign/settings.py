@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from tdacoustic.campaign.values import FrequencyBand
+from tdacoustic.campaign.values import FrequencyBand, ascending
 from tdacoustic.toml_models import Positive, Table, each_once
 
 __all__ = ["AnalysisSettings"]
@@ -33,6 +33,22 @@ class AnalysisSettings(Table):
         A run whose speed varies by more, relative, is a run-up.
     mains_hz : float
         Of the supply whose hum is looked for.
+    order_bandwidth : float
+        Of a cut along an order, in orders of the order's own shaft.
+    highest_order : float or None
+        Of the motor shaft, up to which orders are mapped and cut. Default: half a harmonic beyond ten of the mesh, 300
+        without a fleet, no more than the sampling rate holds at the run's middle speed.
+    vold_kalman : bool or tuple of float
+        Whether a Vold-Kalman filter tracks the strongest orders of a run-up, up to four, or the orders that it tracks.
+    speed_from : str
+        ``"auto"``: from speed and tacho channels; where none tells a shaft's speed and the run states none, from the
+        lines that the drive's orders draw in vibration. ``"channels"``: never from lines. ``"lines"``: from lines too
+        where channels tell it, for comparison.
+    motor_speed_range_rpm : (float, float) or None
+        Within which lines are searched for the motor's speed. Default: the fleet's speeds with a margin, else 60 to
+        6000 rpm.
+    motor_speed_change_rpm_s : float or None
+        By how much the motor's speed changes in a second at most. Default: that of 2.5 m/s² of the train, else 480.
     """
 
     orders: Annotated[tuple[Positive, ...], AfterValidator(each_once)] = ()
@@ -43,3 +59,9 @@ class AnalysisSettings(Table):
     line_prominence_db: Annotated[float, Field(gt=0.0, le=100.0)] = 4.0
     speed_tolerance: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.03
     mains_hz: Annotated[float, Field(gt=0.0, le=1000.0)] = 50.0
+    order_bandwidth: Annotated[float, Field(gt=0.0, le=10.0)] = 0.5
+    highest_order: Annotated[float, Field(gt=1.0, le=20000.0)] | None = None
+    vold_kalman: bool | Annotated[tuple[Positive, ...], AfterValidator(each_once)] = True
+    speed_from: Literal["auto", "channels", "lines"] = "auto"
+    motor_speed_range_rpm: Annotated[tuple[Positive, Positive], AfterValidator(ascending)] | None = None
+    motor_speed_change_rpm_s: Positive | None = None

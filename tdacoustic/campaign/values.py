@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 
 from tdacoustic.toml_models import NonNegative
 
-__all__ = ["FrequencyBand", "StatedPath", "WrittenPath"]
+__all__ = ["FrequencyBand", "StatedPath", "WrittenPath", "ascending"]
 
 
 @dataclass(frozen=True)
@@ -47,13 +47,14 @@ def _path(value: Any, info: ValidationInfo) -> WrittenPath:
     return WrittenPath.of(value, (info.context or {}).get("folder", Path()))
 
 
-def _ascending(value: tuple[float, float]) -> tuple[float, float]:
+def ascending(value: tuple[float, float]) -> tuple[float, float]:
+    """Return ``[from, to]`` that rises; for validators."""
     if not value[0] < value[1]:
         raise ValueError(f"must be [from, to] with from < to, got [{value[0]:g}, {value[1]:g}]")
     return value
 
 
-FrequencyBand = Annotated[tuple[NonNegative, NonNegative], AfterValidator(_ascending)]
+FrequencyBand = Annotated[tuple[NonNegative, NonNegative], AfterValidator(ascending)]
 """``[from, to]`` in Hz."""
 
 StatedPath = Annotated[WrittenPath, BeforeValidator(_path)]

@@ -103,7 +103,7 @@ def agreement_of_evidence(
     if not speaking:
         return Agreement("silent", None, None, {}, {}, silent, "no kind of evidence names a source")
     leads = {kind: max(named.items(), key=lambda item: item[1]) for kind, named in speaking.items()}
-    told = "; ".join(f"{kind}: {source} {100.0 * value:.0f} %" for kind, (source, value) in leads.items())
+    told = "; ".join(f"{kind}: {source} {_percent(value)}" for kind, (source, value) in leads.items())
     sure = {source for source, value in leads.values() if value >= SURE}
     if len(sure) > 1:
         return Agreement("disagree", None, None, {}, leads, silent, f"they disagree: {told}{aside}")
@@ -111,12 +111,17 @@ def agreement_of_evidence(
     source, probability = max(joint.items(), key=lambda item: item[1])
     word: Word = "single" if len(speaking) == 1 else "agree"
     if word == "agree" and any(lead != source for lead, _ in leads.values()):
-        opening = f"mostly {source}, {100.0 * probability:.0f} % together, one is not sure"
+        opening = f"mostly {source}, {_percent(probability)} together, one is not sure"
     elif word == "agree":
-        opening = f"they agree on {source}, {100.0 * probability:.0f} % together"
+        opening = f"they agree on {source}, {_percent(probability)} together"
     else:
         opening = f"one kind alone names {source}"
     return Agreement(word, source, probability, joint, leads, silent, f"{opening}: {told}{aside}")
+
+
+def _percent(probability: float) -> str:
+    """A probability in words; none from resampling is certain."""
+    return "> 99 %" if probability > 0.994 else f"{100.0 * probability:.0f} %"
 
 
 def _named(given: Mapping[str, float] | None) -> dict[str, float]:

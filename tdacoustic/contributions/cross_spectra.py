@@ -67,6 +67,15 @@ class CrossPlan:
         return np.arange(self.n_lines, dtype=np.float64) * self.frames.resolution_hz
 
     @property
+    def segment_times_s(self) -> Array:
+        """Middle of each segment after the record's start, shape (n_segments,)."""
+        frames = self.frames
+        number = np.arange(frames.n_frames)
+        segment = number * frames.n_segments // frames.n_frames
+        middle = (number * frames.hop + 0.5 * frames.frame_length) / frames.sample_rate_hz
+        return np.bincount(segment, weights=middle) / np.bincount(segment)
+
+    @property
     def segment_bytes(self) -> int:
         """Memory of one segment's matrices."""
         return _segment_bytes(self.n_lines, self.n_references, self.n_receivers)
@@ -173,11 +182,7 @@ class CrossSpectra:
     @property
     def segment_times_s(self) -> Array:
         """Middle of each segment after the record's start, shape (n_segments,) of the plan."""
-        frames = self.plan.frames
-        number = np.arange(frames.n_frames)
-        segment = number * frames.n_segments // frames.n_frames
-        middle = (number * frames.hop + 0.5 * frames.frame_length) / frames.sample_rate_hz
-        return np.bincount(segment, weights=middle) / np.bincount(segment)
+        return self.plan.segment_times_s
 
     def select(self, segments: NDArray[np.bool_] | Sequence[int]) -> CrossSpectra:
         """Return the spectra of some segments alone, as those of one speed of a run-up.

@@ -83,8 +83,9 @@ class GroupPart:
     path_mean_square : float
         What plain OTPA says, the power of ``T_g x_g``: cross-talk in the references is part of it.
     low, high : float
-        Scatter of the segments and cross-talk together, unit²; the lower one is 0 where there is none. Of a flagged
-        one it is the range of its one-way readings, which is no confidence interval: cross-talk may go both ways.
+        Scatter of the segments and cross-talk together, unit²; the lower one is 0 where there is none. The upper one of
+        a known part reaches to where parts and residual add up to the whole. Of a flagged one it is the range of its
+        one-way readings, which is no confidence interval: cross-talk may go both ways.
     lowest, highest : float
         What cross-talk alone leaves open, over the value.
     verdict : str

@@ -41,13 +41,14 @@ which lowers the paths, but by rule ``"noise_floor"`` (the residual shows it).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.contributions.matrices import explained_power, inverse_root
-from tdacoustic.contributions.parts import Readings, SpanContributions, group_part, leading
+from tdacoustic.contributions.parts import GroupPart, Readings, SpanContributions, group_part, leading
 from tdacoustic.contributions.separation import seen_shares, separate
 from tdacoustic.contributions.states import HeldStates, OperatingState, PathSettings, Span
 from tdacoustic.contributions.transfer import Transmissibility, state_weights, transmissibility
@@ -101,51 +102,31 @@ def path_contributions(
     """
     settings = PathSettings() if settings is None else settings
     held = HeldStates(states, groups, settings, noise_density)
-    found = []
-    for span in spans:
-        chosen = [k for k, state in enumerate(states) if span.states is None or state.name in span.states]
-        if not chosen:
-            raise AnalysisError(f"span {span.name!r} is of no state; there are {', '.join(s.name for s in states)}")
-        found += _Summed(held, span, chosen).results()
-    return tuple(found)
+    summed = [_Summed(held, span) for span in spans]
+    wanted = np.flatnonzero(np.any([one.width for one in summed], axis=0)) if summed else np.zeros(0, dtype=np.intp)
+    n, q, p = held.settings.draws + 1, len(held.used), len(held.receivers)
+    size = max(1, CHUNK_BYTES // (16 * n * len(held.states) * q * (q + p)))
+    for start in range(0, wanted.size, size):
+        chunk = wanted[start : start + size]
+        lines = _Lines(held, chunk)
+        for one in summed:
+            inside = np.flatnonzero(one.width[chunk])
+            if inside.size:
+                one.add(lines, inside, one.width[chunk[inside]])
+    return tuple(result for one in summed for result in one.results())
 
 
-class _Summed:
-    """Powers of a span, summed over its lines, of all draws."""
+class _Lines:
+    """Powers at some lines, of all states and draws."""
 
-    def __init__(self, held: HeldStates, span: Span, chosen: Sequence[int]) -> None:
-        self.held, self.span, self.chosen = held, span, chosen
-        frequencies, step = held.frequencies_hz, held.resolution_hz
-        part = np.minimum(frequencies + 0.5 * step, span.high_hz) - np.maximum(frequencies - 0.5 * step, span.low_hz)
-        inside = np.flatnonzero(part > 0.0)
-        if not inside.size or span.high_hz > frequencies[-1] + 0.5 * step or span.low_hz < 1.5 * step:
-            raise AnalysisError(
-                f"span {span.name!r}, {span.low_hz:g} to {span.high_hz:g} Hz, must lie between the third line and the "
-                f"last, {2.0 * step:g} to {frequencies[-1]:g} Hz"
-            )
-        n, p, g = held.settings.draws + 1, len(held.receivers), len(held.groups)
-        self.shared = np.zeros((len(chosen), n, p, g, g), dtype=np.complex128)
-        self.total, self.residual = np.zeros((len(chosen), n, p)), np.zeros((len(chosen), n, p))
-        self.pooled = np.zeros((p, g, g), dtype=np.complex128)
-        self.alone, self.on_top = np.zeros((p, g)), np.zeros((p, g))
-        self.leaked = np.zeros((len(chosen), p, g))
-        self.sources, self.variance = np.zeros((len(chosen), p, g)), np.zeros((len(chosen), p, g))
-        self.untold = np.zeros((len(chosen), p, g))
-        self.noise, self.source_power = np.zeros((p, g)), np.zeros((p, g))
-        self.seen, self.seen_weight = np.zeros((p, g, g)), np.zeros(p)
-        self.components = np.zeros(p)
-        q = len(held.used)
-        size = max(1, CHUNK_BYTES // (16 * n * len(held.states) * q * (q + p)))
-        for start in range(inside[0], inside[-1] + 1, size):
-            lines = slice(start, min(start + size, inside[-1] + 1))
-            self._add(lines, np.minimum(part[lines], step))
-        self.components /= inside.size
-
-    def _add(self, lines: slice, width: Array) -> None:
-        held, settings = self.held, self.held.settings
+    def __init__(self, held: HeldStates, lines: NDArray[np.intp]) -> None:
+        self.held = held
+        self.member = np.zeros((len(held.used), len(held.groups)), dtype=np.complex128)  # whose each reference is
+        for group, members in enumerate(held.members):
+            self.member[members, group] = 1.0
         states = [held.matrices(state, lines) for state in range(len(held.states))]
         own = np.array([np.diagonal(s_xx[0], axis1=1, axis2=2).real for s_xx, _, _ in states])
-        weights = state_weights(own, held.averages, settings.weighting)
+        weights = state_weights(own, held.averages, held.settings.weighting)
         s_xx, s_xy, s_yy = (
             sum(
                 weight[(slice(None), *[None] * (state[kind].ndim - 2))] * state[kind]
@@ -155,32 +136,30 @@ class _Summed:
         )
         noise = None if held.noise is None else held.noise[lines] * weights.sum(axis=0)[:, None]
         n = float(held.averages.sum())
-        found = transmissibility(s_xx, s_xy, s_yy, n, settings.rule, noise)
-        self.components += found.freedom[0].sum(axis=0)
+        found = transmissibility(s_xx, s_xy, s_yy, n, held.settings.rule, noise)
+        self.components = found.freedom[0]
         pooled, bias = self._parts(found, s_xx)
-        pooled = pooled[0] - bias[0]
-        self.pooled += np.einsum("f,fpgh->pgh", width, pooled)
-        self._readings(s_xx[0], s_xy[0], s_yy[0], found.residual[0], width)
-        power = np.maximum(np.diagonal(pooled, axis1=-2, axis2=-1).real, 0.0)
+        self.pooled = pooled[0] - bias[0]
+        self.alone, self.on_top = self._readings(s_xx[0], s_xy[0], s_yy[0], found.residual[0])
+        power = np.maximum(np.diagonal(self.pooled, axis1=-2, axis2=-1).real, 0.0)
         noise_part = power[..., :, None] * power[..., None, :] / n
-        square = np.maximum(np.abs(pooled) ** 2 - noise_part, 0.0)
+        square = np.maximum(np.abs(self.pooled) ** 2 - noise_part, 0.0)
         leak = square * inverse_root(power)[..., None, :] ** 4  # |K_gh|² / K_hh²
         leak[..., np.arange(leak.shape[-1]), np.arange(leak.shape[-1])] = 0.0
         sensor_noise = SENSOR_NOISE * np.diagonal(s_xx[0], axis1=1, axis2=2).real if noise is None else noise
-        self._separate(found, states, s_xx[0], sensor_noise, width)
-        for place, state in enumerate(self.chosen):
-            xx, xy, yy = states[state]
+        self._separate(found, states, s_xx[0], sensor_noise)
+        self.shared, self.total, self.residual, self.leaked = [], [], [], []
+        for state, (xx, xy, yy) in enumerate(states):
             parts, bias = self._parts(found, xx)
             share = held.averages[state] / n
             lost = bias.sum(axis=(-2, -1)).real
             predicted = np.einsum("dfqp,dfqp->dfp", found.paths.conj(), xy).real
-            residual = yy - 2.0 * predicted + parts.sum(axis=(-2, -1)).real + (2.0 * share - 1.0) * lost
+            self.residual.append(yy - 2.0 * predicted + parts.sum(axis=(-2, -1)).real + (2.0 * share - 1.0) * lost)
             parts = parts - bias
-            self.shared[place] += np.einsum("f,dfpgh->dpgh", width, parts)
-            self.total[place] += np.einsum("f,dfp->dp", width, yy)
-            self.residual[place] += np.einsum("f,dfp->dp", width, residual)
+            self.shared.append(parts)
+            self.total.append(yy)
             here = np.maximum(np.diagonal(parts[0], axis1=-2, axis2=-1).real, 0.0)
-            self.leaked[place] += np.einsum("f,fpgh,fph->pg", width, leak, here)
+            self.leaked.append(np.einsum("fpgh,fph->fpg", leak, here))
 
     def _separate(
         self,
@@ -188,59 +167,112 @@ class _Summed:
         states: Sequence[tuple[Complex, Complex, Array]],
         s_xx: Complex,
         sensor_noise: Array,
-        width: Array,
     ) -> None:
-        """Add the sources' own powers, line by line, from the states together."""
+        """The sources' own powers, line by line, from the states together."""
         first = Transmissibility(found.paths[:1], found.freedom[:1], found.spread[:1], found.residual[:1])
         shared = []
         for of_state, _, _ in states:
             parts, bias = self._parts(first, of_state[:1])
             shared.append((parts - bias)[0])
         stacked = np.array(shared)  # (n_states, n_lines, n_receivers, n_groups, n_groups)
+        n_states, n_lines, p, g, _ = stacked.shape
+        self.sources, self.variance = np.zeros((n_states, n_lines, p, g)), np.zeros((n_lines, p, g))
+        self.source_power, self.noise = np.zeros((n_lines, p, g)), np.zeros((n_lines, p, g))
+        self.seen = np.zeros((n_lines, p, g, g))
         members = [len(group) for group in self.held.members]
         starts = [group[0] for group in self.held.members]
         own = np.diagonal(s_xx, axis1=1, axis2=2).real
-        for receiver in range(stacked.shape[2]):
+        for receiver in range(p):
             paths = found.paths[0, :, :, receiver]
             # Of references, scaled to unit power, and contributions of the groups.
             seen = np.add.reduceat(s_xx * paths[:, None, :] * inverse_root(own)[:, :, None], starts, axis=2)
             told = separate(np.moveaxis(stacked[:, :, receiver], 0, 1), self.held.averages, seen, members)
-            known = told.variance < UNTOLD
-            for place, state in enumerate(self.chosen):
-                power = width[:, None] * told.power[:, state]
-                self.sources[place, receiver] += power.sum(axis=0)
-                self.variance[place, receiver] += (power**2 * np.where(known, told.variance, 0.0)).sum(axis=0)
-                self.untold[place, receiver] += (power * ~known).sum(axis=0)
+            self.sources[:, :, receiver] = np.moveaxis(told.power, 1, 0)
+            self.variance[:, receiver] = told.variance
             weights = np.repeat(told.unmix, members, axis=2) * paths.conj()[:, None, :]  # a source by references
             power = np.einsum("fki,fij,fkj->fk", weights, s_xx, weights.conj(), optimize=True).real
-            share = seen_shares(told.unmix, seen, members) * inverse_root(power)[:, None, :] ** 2
-            weight = width * np.maximum(power, 0.0).sum(axis=1)
-            self.source_power[receiver] += width @ power
-            self.noise[receiver] += width @ np.einsum("fki,fi->fk", np.abs(weights) ** 2, sensor_noise)
-            self.seen[receiver] += np.einsum("f,fhk->hk", weight, share)
-            self.seen_weight[receiver] += float(weight.sum())
+            self.source_power[:, receiver] = power
+            self.noise[:, receiver] = np.einsum("fki,fi->fk", np.abs(weights) ** 2, sensor_noise)
+            shares = seen_shares(told.unmix, seen, members)
+            self.seen[:, receiver] = shares * inverse_root(power)[:, None, :] ** 2
 
     def _parts(self, found: Transmissibility, s_xx: Complex) -> tuple[Complex, Complex]:
         """K and its bias, shape (n_draws, n_lines, n_receivers, n_groups, n_groups)."""
-        full = np.einsum("dfip,dfij,dfjp->dfpij", found.paths.conj(), s_xx, found.paths, optimize=True)
+        paths = np.moveaxis(found.paths, -1, 2)[..., None] * self.member  # (..., n_receivers, n_references, n_groups)
+        full = paths.conj().swapaxes(-1, -2) @ (s_xx[:, :, None] @ paths)
         scatter = s_xx[:, :, None] * found.spread.swapaxes(-1, -2)
-        return self._by_group(full), self._by_group(scatter)
+        return full, self.member.T @ (scatter @ self.member)
 
-    def _by_group(self, values: Complex) -> Complex:
-        starts = [members[0] for members in self.held.members]
-        return np.add.reduceat(np.add.reduceat(values, starts, axis=-1), starts, axis=-2)
-
-    def _readings(self, s_xx: Complex, s_xy: Complex, s_yy: Array, residual: Array, width: Array) -> None:
-        """Add what each group explains alone, and on top of all others, in the states together."""
+    def _readings(self, s_xx: Complex, s_xy: Complex, s_yy: Array, residual: Array) -> tuple[Array, Array]:
+        """What each group explains alone, and on top of all others, in the states together."""
         q, n = s_xx.shape[-1], float(self.held.averages.sum())
         whole, _ = explained_power(s_xx, s_xy, range(q))
-        for group, members in enumerate(self.held.members):
+        first, last = [], []
+        for members in self.held.members:
             others = [index for index in range(q) if index not in members]
             alone, rank = explained_power(s_xx, s_xy, members)
             rest, _ = explained_power(s_xx, s_xy, others)
             left = np.maximum(s_yy - alone, 0.0) * (rank / np.maximum(n - rank, 1e-9))[:, None]
-            self.alone[:, group] += width @ (alone - left)
-            self.on_top[:, group] += width @ (whole - rest - residual * len(members) / n)
+            first.append(alone - left)
+            last.append(whole - rest - residual * len(members) / n)
+        return np.stack(first, axis=-1), np.stack(last, axis=-1)
+
+
+class _Summed:
+    """Powers of a span, summed over its lines, of all draws."""
+
+    def __init__(self, held: HeldStates, span: Span) -> None:
+        self.held, self.span = held, span
+        named = [state.name for state in held.states]
+        self.chosen = [k for k, name in enumerate(named) if span.states is None or name in span.states]
+        if not self.chosen:
+            raise AnalysisError(f"span {span.name!r} is of no state; there are {', '.join(named)}")
+        frequencies, step = held.frequencies_hz, held.resolution_hz
+        self.width = span.width_hz(frequencies, step)
+        self.n_lines = np.count_nonzero(self.width)
+        if not self.n_lines or span.high_hz > frequencies[-1] + 0.5 * step or span.low_hz < 1.5 * step:
+            raise AnalysisError(
+                f"span {span.name!r}, {span.low_hz:g} to {span.high_hz:g} Hz, must lie between the third line and the "
+                f"last, {2.0 * step:g} to {frequencies[-1]:g} Hz"
+            )
+        n, p, g = held.settings.draws + 1, len(held.receivers), len(held.groups)
+        count = len(self.chosen)
+        self.shared = np.zeros((count, n, p, g, g), dtype=np.complex128)
+        self.total, self.residual = np.zeros((count, n, p)), np.zeros((count, n, p))
+        self.pooled = np.zeros((p, g, g), dtype=np.complex128)
+        self.alone, self.on_top = np.zeros((p, g)), np.zeros((p, g))
+        self.leaked = np.zeros((count, p, g))
+        self.sources, self.variance = np.zeros((count, p, g)), np.zeros((count, p, g))
+        self.untold = np.zeros((count, p, g))
+        self.noise, self.source_power = np.zeros((p, g)), np.zeros((p, g))
+        self.seen, self.seen_weight = np.zeros((p, g, g)), np.zeros(p)
+        self.components = np.zeros(p)
+
+    def add(self, lines: _Lines, inside: NDArray[np.intp], width: Array) -> None:
+        """Add lines inside, each by its part in Hz."""
+        self.components += lines.components[inside].sum(axis=0) / self.n_lines
+        for mine, theirs in (
+            (self.pooled, lines.pooled),
+            (self.alone, lines.alone),
+            (self.on_top, lines.on_top),
+            (self.source_power, lines.source_power),
+            (self.noise, lines.noise),
+        ):
+            mine += np.tensordot(width, theirs[inside], axes=1)
+        weight = width[:, None] * np.maximum(lines.source_power[inside], 0.0).sum(axis=-1)
+        self.seen += np.einsum("fp,fphk->phk", weight, lines.seen[inside])
+        self.seen_weight += weight.sum(axis=0)
+        variance = lines.variance[inside]
+        known = variance < UNTOLD
+        for place, state in enumerate(self.chosen):
+            power = width[:, None, None] * lines.sources[state][inside]
+            self.sources[place] += power.sum(axis=0)
+            self.variance[place] += (power**2 * np.where(known, variance, 0.0)).sum(axis=0)
+            self.untold[place] += (power * ~known).sum(axis=0)
+            self.leaked[place] += np.tensordot(width, lines.leaked[state][inside], axes=1)
+            self.shared[place] += np.tensordot(width, lines.shared[state][:, inside], axes=(0, 1))
+            self.total[place] += np.tensordot(width, lines.total[state][:, inside], axes=(0, 1))
+            self.residual[place] += np.tensordot(width, lines.residual[state][:, inside], axes=(0, 1))
 
     def results(self) -> list[SpanContributions]:
         """One a state and receiver."""
@@ -262,6 +294,7 @@ class _Summed:
             draws = shared[:, group, group].real
             powers = float(explained[0]), max(0.0, float(residual[0]))
             parts[name] = group_part(draws, readings, *powers, segments, probability, len(held.states))
+        parts = _with_what_is_missing(parts, float(self.total[place][0, receiver]), max(0.0, float(residual[0])))
         return SpanContributions.of(
             state=state.name,
             receiver=held.receivers[receiver],
@@ -303,3 +336,18 @@ class _Summed:
             else np.inf,
             rival=self.held.groups[rival] if others else "",
         )
+
+
+def _with_what_is_missing(parts: Mapping[str, GroupPart], total: float, residual: float) -> dict[str, GroupPart]:
+    """Widen known contributions to where parts and residual would add up to the whole, in proportion.
+
+    Independent parts do add up. Where a state's paths are not those of all states together, power is missing.
+    """
+    held = sum(part.mean_square or 0.0 for part in parts.values())
+    missing = total - residual - held
+    if not (held > 0.0 and missing > 0.0):
+        return dict(parts)
+    wider = 1.0 + missing / held
+    return {
+        name: replace(part, high=part.high * wider) if part.verdict == "ok" else part for name, part in parts.items()
+    }

@@ -44,12 +44,27 @@ class Span:
         Lines at the edges count by their part inside.
     states : tuple of str or None
         States that it is of (a tone lies elsewhere at another speed); None for all.
+    left_out_hz : tuple of (float, float)
+        Stretches inside that do not count, apart from each other: of what is broadband, the lobes of the tones.
     """
 
     name: str
     low_hz: float
     high_hz: float
     states: tuple[str, ...] | None = None
+    left_out_hz: tuple[tuple[float, float], ...] = ()
+
+    def width_hz(self, frequencies_hz: Array, step_hz: float) -> Array:
+        """Return how much of each line lies inside, in Hz, shape of `frequencies_hz`."""
+
+        def inside(low_hz: float, high_hz: float) -> Array:
+            upper = np.minimum(frequencies_hz + 0.5 * step_hz, high_hz)
+            return np.maximum(upper - np.maximum(frequencies_hz - 0.5 * step_hz, low_hz), 0.0)
+
+        width = inside(self.low_hz, self.high_hz)
+        for low_hz, high_hz in self.left_out_hz:
+            width -= inside(max(low_hz, self.low_hz), min(high_hz, self.high_hz))
+        return np.where(width > 1e-9 * step_hz, width, 0.0)
 
 
 @dataclass(frozen=True)
@@ -147,10 +162,10 @@ class HeldStates:
         rows = [np.broadcast_to(given[references[index]], self.frequencies_hz.shape) for index in self.used]
         return np.stack(rows, axis=-1)
 
-    def matrices(self, state: int, lines: slice) -> tuple[Complex, Complex, Array]:
+    def matrices(self, state: int, lines: NDArray[np.intp]) -> tuple[Complex, Complex, Array]:
         """Resampled means of a state: (n_draws + 1, n_lines, ...), the first without resampling."""
         spectra, weights = self.states[state].spectra, self.draws[state]
-        block = spectra.density[:, self.used][..., lines]
+        block = spectra.density[..., lines][:, self.used]
         columns = [*self.used, *range(len(spectra.references), block.shape[2])]
         block = block[:, :, columns]
         flat = (weights.astype(np.float32) @ block.reshape(len(block), -1)).reshape(-1, *block.shape[1:])

@@ -41,7 +41,7 @@ WIDEST = 64
 """Half width at which a broad peak is no longer widened, in lines of the spectrum."""
 SHOULDER = 12
 """Width of the floor beside a peak that it must stand over, at least, in lines of the spectrum."""
-BUMP_SIGMAS, BLIND_BUMP_SIGMAS = 3.8, 4.4
+BUMP_SIGMAS, BLIND_BUMP_SIGMAS = 3.5, 4.1
 """Standard deviations by which a smeared line stands over the bands beside it: about `FALSE_ALARMS` a spectrum; more
 where its width is not known."""
 WIDEST_SMEAR = 0.0125
@@ -50,6 +50,16 @@ STRONG_DB = 10.0
 """Height of lines that tell their smear."""
 GUARD = 2.5
 """Width beside a line in which no smeared line is sought, in smears."""
+HANN_CORRELATION = 1.94
+"""Variance of a sum over neighbouring lines of a Hann window, over that of as many independent ones."""
+NOISE_BANDWIDTH_LINES = 1.5
+"""Of a Hann window, in lines of the spectrum."""
+SKIRT_PULL = 0.2
+"""Error of a line's frequency, in lines of the spectrum, over the amplitude of a stronger line's skirt beside its own:
+0.1 in the mean over phases and distances in simulations, more where these stay the same from frame to frame."""
+SKIRT_PART = 0.1
+"""Part of the floor from which on the skirt of a stronger line hides what only a sum over many lines would show
+[assumed]."""
 UNKNOWN_SCATTER = (0.0015, 0.004)
 """Relative smears at which lines are sought where nothing says how much the speed moved [assumed]."""
 
@@ -112,30 +122,33 @@ def _reach(excess: Array, peak: int, least: int, scatter: float) -> int:
     return max(least, WIDEST)
 
 
-def _measure(spectrum: Spectrum, floor: Array, peak: int, reach: int, speed_scatter: float) -> Line | None:
-    """Measure the line around a peak; `reach` lines to each side belong to it.
+def _measure(
+    spectrum: Spectrum, floor: Array, skirts: Array, peak: int, own: tuple[int, int], speed_scatter: float
+) -> Line | None:
+    """Measure the line around a peak, of lines `own` of the spectrum (the second not included).
 
-    Where the speed wandered, a line that followed it is a little wider than the window even if no
-    smear is seen, and its frequency is only as sure as the mean over the wander.
+    What the skirts of stronger lines have there is taken off as the floor is. Where the speed wandered, a line that
+    followed it is a little wider than the window even if no smear is seen, and its frequency is only as sure as the
+    mean over the wander.
     """
-    density = spectrum.density
-    low, high = max(1, peak - reach), min(density.size - 1, peak + reach + 1)
-    excess = np.clip(density - floor, 0.0, None)
-    region = np.arange(low, high)
+    density, below = spectrum.density, floor + skirts
+    excess = np.clip(density - below, 0.0, None)
+    region = np.arange(*own)
     weights = excess[region]
-    power = float(np.sum(density[region] - floor[region])) * spectrum.resolution_hz
+    power = float(np.sum(density[region] - below[region])) * spectrum.resolution_hz
     if power <= 0.0 or excess[peak] <= 0.0:
         return None
     centroid = float(region @ weights / weights.sum())
     second_moment = float((region - centroid) ** 2 @ weights / weights.sum())
     extra = max(0.0, second_moment - HANN_SECOND_MOMENT)
-    smeared = reach > MAIN_LOBE and extra > HANN_SECOND_MOMENT
+    smeared = region.size > 2 * MAIN_LOBE + 1 and extra > HANN_SECOND_MOMENT
     offset = centroid - peak if smeared else _interpolated_offset(excess, peak)
     over_floor = power / (float(floor[peak]) * spectrum.noise_bandwidth_hz)
     linear, quadratic = FREQUENCY_VARIANCE
     variance = (linear / over_floor + quadratic / over_floor**2) / spectrum.averages
     wander = extra if smeared else min(extra, (WANDER_SIGMAS * speed_scatter * peak) ** 2)
     variance += WANDER_CORRELATION * wander / spectrum.averages
+    variance += SKIRT_PULL**2 * float(skirts[peak]) * spectrum.resolution_hz / power
     return Line(
         frequency_hz=(peak + offset) * spectrum.resolution_hz,
         frequency_error_hz=math.sqrt(variance) * spectrum.resolution_hz,
@@ -233,11 +246,12 @@ def _broad_bumps(
     right = (flat[places + reach + 1] - flat[high]) / (places + reach + 1 - high)
     beside = np.maximum(1.0, 0.5 * (left + right))
     core = high - low
-    # Neighbouring lines of a Hann window are correlated: the variance of a sum is 1.94 times that of independent ones.
-    scatter = beside * np.sqrt(1.94 * core * (1.0 + core / (2.0 * side)) / spectrum.averages)
+    scatter = beside * np.sqrt(HANN_CORRELATION * core * (1.0 + core / (2.0 * side)) / spectrum.averages)
     sure = (total[high] - total[low] - core * beside) / scatter
     blocked = np.concatenate(([0], np.cumsum(taken)))
     sure[blocked[high] - blocked[low] > 0] = 0.0
+    widths, of_width = np.unique(core, return_inverse=True)
+    sure /= _heavy_tail(2.0 * spectrum.averages * widths / HANN_CORRELATION, least_sigmas)[of_width]
     found: list[tuple[int, int]] = []
     for index in np.argsort(-sure):
         if sure[index] < least_sigmas:
@@ -246,6 +260,20 @@ def _broad_bumps(
         if all(abs(place - other) > 2 * max(width, reached) for other, reached in found):
             found.append((place, width))
     return found
+
+
+def _heavy_tail(freedom: Array, sigmas: float) -> Array:
+    """By how much a sum of powers exceeds, in its own standard deviations, what a normal number does as rarely."""
+    chance = float(stats.norm.sf(sigmas))
+    return np.asarray((stats.chi2.isf(chance, freedom) - freedom) / np.sqrt(2.0 * freedom) / sigmas)
+
+
+def _skirt(line: Line, n_lines: int, resolution_hz: float) -> Array:
+    """Density of a sinusoid beyond its main lobe, shape (n_lines,): the envelope of a Hann window's side lobes."""
+    distance = np.abs(np.arange(n_lines) - line.frequency_hz / resolution_hz)
+    distance = np.maximum(distance, MAIN_LOBE)
+    envelope = 1.0 / (math.pi * distance * (distance**2 - 1.0)) ** 2
+    return line.rms**2 / (NOISE_BANDWIDTH_LINES * resolution_hz) * envelope
 
 
 def find_lines(spectrum: Spectrum, prominence_db: float = 4.0, speed_scatter: float = 0.0) -> tuple[Line, ...]:
@@ -302,37 +330,53 @@ class _Search:
         freedom = 2.0 * spectrum.averages
         self._mean_over_median = freedom / float(stats.chi2.median(freedom))
         self._taken = np.zeros(floor.size, dtype=bool)
+        self._skirts = np.zeros(floor.size)
         self._speed_scatter = speed_scatter
         self.lines: list[Line] = []
 
     def take_peak(self, peak: int, height_db: float) -> None:
         """Take a peak that no stronger line has filled, as broad as the speed or its own shape makes it."""
-        if self._taken[peak]:
+        if self._taken[peak] or self._is_skirt(peak, height_db):
             return
         smear = math.ceil(2.5 * self._speed_scatter * peak)
         if smear > 1 and _is_smeared(self._difference, self._scatter, peak, smear):
             centre = _recentred(self._difference, peak, smear)
             self._take(centre, MAIN_LOBE + max(smear, abs(centre - peak)), height_db)
         else:
-            excess = np.clip(self._difference, 0.0, None)
+            excess = np.clip(self._difference - self._skirts, 0.0, None)
             self._take(peak, _reach(excess, peak, MAIN_LOBE + min(smear, 1), float(self._scatter[peak])), height_db)
 
     def take_bumps(self, relative: float, least_sigmas: float) -> None:
         """Take lines that stand out only in the sum over a relative smear."""
         guarded = _guarded(self._taken, self._spectrum.density, self._floor, relative)
+        guarded |= self._skirts > SKIRT_PART * self._floor
         for place, half in _broad_bumps(self._spectrum, self._floor, guarded, relative, least_sigmas):
             self._take(_recentred(self._difference, place, half), half + MAIN_LOBE, 0.0)
 
     def _take(self, centre: int, reach: int, least_db: float) -> None:
         """Measure and keep a line, unless it is too weak or the top of a resonance."""
+        if self._taken[centre]:
+            return
         density = self._spectrum.density
-        low, high = max(1, centre - reach), min(density.size, centre + reach + 1)
-        line = _measure(self._spectrum, self._floor, centre, reach, self._speed_scatter)
+        low, high = self._own(centre, reach)
+        line = _measure(self._spectrum, self._floor, self._skirts, centre, (low, high), self._speed_scatter)
         beside = self._beside(low, high)
         over_beside_db = 10.0 * math.log10(float(density[low:high].max()) / beside) if beside > 0.0 else math.inf
         if line is not None and line.prominence_db >= self._prominence_db and over_beside_db >= least_db:
             self.lines.append(line)
             self._taken[low:high] = True
+            self._skirts += _skirt(line, density.size, self._spectrum.resolution_hz)
+
+    def _own(self, centre: int, reach: int) -> tuple[int, int]:
+        """Lines of the spectrum within reach that no stronger line has, as (first, last + 1)."""
+        low, high = max(1, centre - reach), min(self._taken.size - 1, centre + reach + 1)
+        left, right = np.flatnonzero(self._taken[low:centre]), np.flatnonzero(self._taken[centre:high])
+        return (low + int(left[-1]) + 1 if left.size else low), (centre + int(right[0]) if right.size else high)
+
+    def _is_skirt(self, peak: int, height_db: float) -> bool:
+        """Whether the skirts of stronger lines and the floor, in phase by chance, are a peak without any line."""
+        chance = math.sqrt(10.0 ** (0.1 * height_db) * self._floor[peak])
+        return bool(math.sqrt(self._spectrum.density[peak]) < math.sqrt(self._skirts[peak]) + chance)
 
     def _beside(self, low: int, high: int) -> float:
         """Floor right beside `low` to `high`: the median of the quieter side, lines left out; 0 where none is free."""

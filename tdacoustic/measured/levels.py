@@ -13,7 +13,7 @@ from tdacoustic.recording import Channel
 from tdacoustic.spectra import correct_for_background
 from tdacoustic.units import level_db, reference_label
 
-__all__ = ["ConditionLevels", "RunLevel", "condition_levels", "energy_mean_db"]
+__all__ = ["ConditionLevels", "RunLevel", "background_laeq_db", "condition_levels", "energy_mean_db"]
 
 
 def energy_mean_db(levels_db: Iterable[float]) -> float | None:
@@ -117,6 +117,18 @@ def condition_levels(
         tuple(rows),
         {name: sum(values) / len(values) if values else None for name, values in speeds.items()},
     )
+
+
+def background_laeq_db(runs: Sequence[MeasuredRun], of_run: CampaignRun) -> dict[str, float]:
+    """Return the A-weighted level of the background that holds for a run, by channel; none without background runs.
+
+    Parameters
+    ----------
+    runs : sequence of MeasuredRun
+        All of the campaign.
+    of_run : CampaignRun
+    """
+    return {name: level for name, (_, level, _) in _backgrounds(runs, of_run).items() if level is not None}
 
 
 Background = tuple[float | None, float | None, float | None]

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tdacoustic.errors import AnalysisError
 from tdacoustic.lines import Family, Line, find_families, find_lines, local_floor
+from tdacoustic.measured.filter_dependence import beside_lines, beside_moving_lines
 from tdacoustic.measured.results import Band, ChannelResult, RasterSurvey, RunMeasurement, RunSpeed, SegmentMap, Survey
 from tdacoustic.quality import Statistics, Verdict, check_channel, check_duplicates, check_siblings, check_speed
-from tdacoustic.recording import Channel
+from tdacoustic.recording import Channel, span_of
 from tdacoustic.spectra import SegmentPowers, Spectrum, a_weighting_db, average_spectrum
 from tdacoustic.steps import Step
 from tdacoustic.units import level_db
@@ -20,8 +21,6 @@ from tdacoustic.units import level_db
 __all__ = ["MEASUREMENT", "MeasurementSettings", "measure_run"]
 
 MAP_FREQUENCIES = 400
-LINE_OVER_BAND_DB, BANDS_BESIDE = 15.0, 3
-"""A band within three bands of a line this much stronger depends on the filter's skirts (analysers differ by 12 dB)."""
 
 
 @dataclass(frozen=True)
@@ -55,9 +54,16 @@ def measure_run(settings: MeasurementSettings, speed: RunSpeed, survey: Survey) 
     steady = speed.is_steady(settings.speed_tolerance)
     scatter = speed.scatter if steady else 0.0
     verdicts = [Verdict(name, "channel", "bad", reason) for name, reason in settings.refused]
-    verdicts += check_speed(speed.profiles, settings.speed_tolerance, dict(settings.stated), speed.problems)
-    results = []
     signals = [channel for channel in settings.channels if not channel.is_speed]
+    verdicts += check_speed(
+        speed.profiles,
+        settings.speed_tolerance,
+        dict(settings.stated),
+        speed.problems,
+        span_of(signals),
+        None if speed.lines is None else speed.lines.reason,
+    )
+    results = []
     for channel in signals:
         raster, index = survey.of_channel(channel.name)
         result, found = _measure_channel(channel, raster, index, settings, steady, scatter)
@@ -68,7 +74,7 @@ def measure_run(settings: MeasurementSettings, speed: RunSpeed, survey: Survey) 
         verdicts += check_duplicates(held, raster.statistics)
     good = [(channel, result.rms) for channel, result in zip(signals, results, strict=True) if result.usable]
     verdicts += check_siblings([channel for channel, _ in good], [rms for _, rms in good])
-    return RunMeasurement(speed, steady, tuple(results), tuple(verdicts))
+    return RunMeasurement(replace(speed, angles=()), steady, tuple(results), tuple(verdicts))
 
 
 def _measure_channel(
@@ -101,7 +107,7 @@ def _measure_channel(
         lines=lines,
         families=families,
         map=None if steady or raster.powers is None else _segment_map(raster.powers, index),
-        bands=_bands(raster, channel.name, lines),
+        bands=_bands(raster, channel.name, lines, steady),
     )
     return result, verdicts
 
@@ -152,16 +158,14 @@ def _segment_map(powers: SegmentPowers, index: int) -> SegmentMap:
     return SegmentMap(powers.segment_times_s[used], centres, cells.T.astype(np.float64))
 
 
-def _bands(raster: RasterSurvey, name: str, lines: Sequence[Line]) -> tuple[Band, ...]:
+def _bands(raster: RasterSurvey, name: str, lines: Sequence[Line], steady: bool) -> tuple[Band, ...]:
     if raster.bands is None or name not in raster.band_channels:
         return ()
     mean_square = raster.bands.mean_square[raster.band_channels.index(name)]
-    number = np.round(10.0 * np.log10(raster.bands.centre_hz / 1000.0))
-    dependent = np.zeros(mean_square.size, dtype=bool)
-    for line in lines:
-        own = round(10.0 * math.log10(line.frequency_hz / 1000.0))
-        weak = line.rms**2 > mean_square * 10.0 ** (0.1 * LINE_OVER_BAND_DB)
-        dependent |= weak & (np.abs(number - own) <= BANDS_BESIDE) & (number != own)
+    if steady or raster.powers is None:
+        dependent = beside_lines(raster.bands.centre_hz, mean_square, lines)
+    else:
+        dependent = beside_moving_lines(raster.bands.centre_hz, mean_square, raster.powers, raster.channels.index(name))
     return tuple(
         Band(float(nominal), float(power), bool(flag))
         for nominal, power, flag in zip(raster.bands.nominal_hz, mean_square, dependent, strict=True)
@@ -169,4 +173,4 @@ def _bands(raster: RasterSurvey, name: str, lines: Sequence[Line]) -> tuple[Band
     )
 
 
-MEASUREMENT = Step("measurement", 4, measure_run, "Levels, spectra, lines and quality")
+MEASUREMENT = Step("measurement", 6, measure_run, "Levels, spectra, lines and quality")

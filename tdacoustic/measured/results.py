@@ -11,11 +11,34 @@ from tdacoustic.errors import AnalysisError
 from tdacoustic.lines import Family, Line
 from tdacoustic.quality import Statistics, Verdict
 from tdacoustic.spectra import BandPowers, SegmentPowers, Spectrum
-from tdacoustic.speed import SpeedProfile
+from tdacoustic.speed import ShaftAngle, SpeedProfile
 
-__all__ = ["Band", "ChannelResult", "RasterSurvey", "RunMeasurement", "RunSpeed", "SegmentMap", "Survey"]
+__all__ = ["Band", "ChannelResult", "LineReading", "RasterSurvey", "RunMeasurement", "RunSpeed", "SegmentMap", "Survey"]
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LineReading:
+    """How a speed was sought in the lines of vibration.
+
+    Parameters
+    ----------
+    channels : tuple of str
+        Whose lines were looked at.
+    reason : str or None
+        Why there is no speed; None where there is one.
+    heard : tuple of (str, float)
+        Each order that was expected, and the probability that the machine has it.
+    rival_ratio, rival_probability : float
+        The next likely reading of the same lines: its speed over this one's. NaN and 0 without one.
+    """
+
+    channels: tuple[str, ...]
+    reason: str | None
+    heard: tuple[tuple[str, float], ...] = ()
+    rival_ratio: float = float("nan")
+    rival_probability: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -27,10 +50,17 @@ class RunSpeed:
     profiles : tuple of SpeedProfile
     problems : tuple of (str, str)
         Channels from which no speed could be had, and why.
+    angles : tuple of ShaftAngle
+        Of the shafts whose speed is known, on the run's time axis; `ShaftAngle.channel` says whence. Not in the
+        measurement of a run, only in what the steps of the speed return: they are long.
+    lines : LineReading or None
+        Where the speed was sought in lines too.
     """
 
     profiles: tuple[SpeedProfile, ...]
     problems: tuple[tuple[str, str], ...] = ()
+    angles: tuple[ShaftAngle, ...] = ()
+    lines: LineReading | None = None
 
     @property
     def leading(self) -> SpeedProfile | None:
@@ -53,6 +83,10 @@ class RunSpeed:
     def of_shaft(self, shaft: str) -> SpeedProfile | None:
         """Return the first profile of a shaft (``motor``, ``wheelset``), or None."""
         return next((profile for profile in self.profiles if profile.shaft == shaft), None)
+
+    def angle_of(self, shaft: str) -> ShaftAngle | None:
+        """Return the first angle of a shaft, or None."""
+        return next((angle for angle in self.angles if angle.shaft == shaft), None)
 
 
 @dataclass(frozen=True)

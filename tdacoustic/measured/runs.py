@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tdacoustic.campaign import CampaignRun
 from tdacoustic.measured.results import RunMeasurement
 from tdacoustic.quality import Verdict
-from tdacoustic.recording import Recording
+from tdacoustic.recording import Recording, span_of
 
 __all__ = ["MeasuredRun", "receivers", "receivers_of"]
 
@@ -50,13 +50,18 @@ class MeasuredRun:
         return tuple(result.channel for result in self.measurement.channels if result.usable)
 
     @property
+    def span_s(self) -> tuple[float, float] | None:
+        """First and last instant of its signals; None where there is none."""
+        return None if self.recording is None else span_of([c for c in self.recording.channels if not c.is_speed])
+
+    @property
     def motor_speed_hz(self) -> float | None:
         """Steady speed of the motor's shaft in revolutions per second, measured or else stated; None for a run-up."""
         if self.measurement is None or not self.measurement.steady:
             return None
         profile = self.measurement.speed.of_shaft("motor")
         if profile is not None and profile.si_symbol == "1/s":
-            return profile.mean
+            return abs(profile.mean)
         return None if self.run.motor_speed_rpm is None else self.run.motor_speed_rpm / 60.0
 
     @property
@@ -67,7 +72,7 @@ class MeasuredRun:
         if self.measurement is None or not self.measurement.steady:
             return None
         profile = next((p for p in self.measurement.speed.profiles if p.si_symbol == "m/s"), None)
-        return None if profile is None else 3.6 * profile.mean
+        return None if profile is None else 3.6 * abs(profile.mean)
 
 
 def receivers(runs: Sequence[MeasuredRun]) -> tuple[str, ...]:

@@ -5,7 +5,9 @@ A time signal becomes even in angle (`AngleResampler`), is cut into frames (`Fra
 """
 
 from tdacoustic.orders.bandwidth import BandwidthAdvice, advise_bandwidth
+from tdacoustic.orders.discovery import find_orders, order_strengths
 from tdacoustic.orders.frames import EachFrame, Frames, LineFrames, SpeedRows, TimeRows, plan_line_frames
+from tdacoustic.orders.named import FrequencyCurve, NamedOrder, OrderKind
 from tdacoustic.orders.order_cut import CutMeter, Neighbour, OrderCut
 from tdacoustic.orders.order_map import MapMeter, OrderMap
 from tdacoustic.orders.resampling import AngleResampler, AngleSignal, EvenBlock, EvenTime
@@ -25,10 +27,13 @@ __all__ = [
     "EvenTime",
     "FixedFrequency",
     "Frames",
+    "FrequencyCurve",
     "LineFrames",
     "MapMeter",
+    "NamedOrder",
     "Neighbour",
     "OrderCut",
+    "OrderKind",
     "OrderMap",
     "OrderTrack",
     "SidebandFamily",
@@ -40,6 +45,8 @@ __all__ = [
     "VoldKalman",
     "advise_bandwidth",
     "find_fixed_frequencies",
+    "find_orders",
+    "order_strengths",
     "plan_line_frames",
     "sideband_families",
     "sideband_orders",

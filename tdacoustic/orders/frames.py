@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final, Literal, Protocol
 
 import numpy as np
@@ -75,9 +76,7 @@ class LineFrames:
     @property
     def window_values(self) -> Array:
         """The window, periodic, shape (length,)."""
-        angle = 2.0 * np.pi * np.arange(self.length) / self.length
-        terms = COSINES[self.window]
-        return np.asarray(sum((-1) ** k * term * np.cos(k * angle) for k, term in enumerate(terms)))
+        return _window(self.window, self.length)
 
     @property
     def noise_lines(self) -> float:
@@ -96,19 +95,43 @@ class LineFrames:
         ``n / (1 + 2 Σ (1 - j/n) rho_j²)`` with the window's autocorrelation rho at j hops (P. D. Welch, IEEE Trans.
         Audio Electroacoust. 15 (1967) 70).
         """
-        window, counts = self.window_values, np.maximum(np.asarray(n_frames, dtype=np.float64), 1.0)
+        counts = np.maximum(np.asarray(n_frames, dtype=np.float64), 1.0)
         total = np.ones(counts.shape)
-        for step in range(1, math.ceil(self.length / self.hop)):
-            rho = float(window[step * self.hop :] @ window[: -step * self.hop]) / float(window @ window)
+        for step, rho in enumerate(_autocorrelation(self.window, self.length, self.hop), start=1):
             total += 2.0 * np.clip(1.0 - step / counts, 0.0, None) * rho**2
         return np.where(np.asarray(n_frames) > 0, np.maximum(counts / total, 1.0), 0.0)
 
     def line_transform(self, offsets: ArrayLike) -> NDArray[np.complex128]:
         """Return what a line of rms 1 and phase 0 at a frame's start gives at so many lines above it, same shape."""
-        angle = np.arange(self.length) / self.length
-        turns = np.exp(-2j * np.pi * np.outer(np.ravel(offsets), angle))
-        values = turns @ self.window_values / self.window_values.sum()
-        return np.asarray(values.reshape(np.shape(offsets)))
+        terms, at = COSINES[self.window], np.asarray(offsets, dtype=np.float64)
+        values = terms[0] * self._even_sum(at)
+        for k, term in enumerate(terms[1:], start=1):
+            values = values + 0.5 * (-1) ** k * term * (self._even_sum(at - k) + self._even_sum(at + k))
+        return np.asarray(values / terms[0])
+
+    def _even_sum(self, offsets: Array) -> NDArray[np.complex128]:
+        """Mean of exp(-2πi d n / N) over the N samples of a frame."""
+        turn = np.exp(-2j * np.pi * offsets / self.length)
+        whole = np.abs(turn - 1.0) < 1e-12
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = (1.0 - np.exp(-2j * np.pi * offsets)) / (self.length * (1.0 - turn))
+        return np.asarray(np.where(whole, 1.0, mean))
+
+
+@lru_cache(maxsize=16)
+def _window(name: WindowName, length: int) -> Array:
+    angle = 2.0 * np.pi * np.arange(length) / length
+    values = np.asarray(sum((-1) ** k * term * np.cos(k * angle) for k, term in enumerate(COSINES[name])))
+    values.setflags(write=False)
+    return values
+
+
+@lru_cache(maxsize=16)
+def _autocorrelation(name: WindowName, length: int, hop: int) -> tuple[float, ...]:
+    """Of a window at 1, 2, ... hops, over that at none."""
+    window = _window(name, length)
+    steps = range(hop, length, hop)
+    return tuple(float(window[step:] @ window[:-step]) / float(window @ window) for step in steps)
 
 
 def plan_line_frames(

@@ -266,7 +266,7 @@ class CutMeter:
 
     def _floor(self, index: int, channel: int, filled: NDArray[np.intp], count: Array, usable: NDArray) -> Array:
         """Floor in the band: median of the lines beside it, put on the scale of the mean of so many frames."""
-        from scipy import stats
+        from scipy import special
 
         band = self._bands[index]
         if len(band.side) < FEWEST_SIDE_LINES:
@@ -274,7 +274,8 @@ class CutMeter:
         side = self._side[index, channel, filled][:, : len(band.side)] / count[:, None]
         freedom = 2.0 * np.maximum(self.plan.independent(count), 1.0)
         wide = self.bandwidth / self.plan.resolution / self.plan.noise_lines
-        return np.where(usable, np.median(side, axis=1) * freedom / stats.chi2.median(freedom) * wide, np.nan)
+        median = 2.0 * special.gammaincinv(0.5 * freedom, 0.5)  # of chi squared
+        return np.where(usable, np.median(side, axis=1) * freedom / median * wide, np.nan)
 
     def _reasons(
         self, band: _Band, filled: NDArray[np.intp], times: Array, speeds: Array, valid: NDArray[np.int64]

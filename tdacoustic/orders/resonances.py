@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import AnalysisError
+from tdacoustic.orders.baseline import beside
 from tdacoustic.orders.order_cut import OrderCut
 from tdacoustic.orders.order_map import OrderMap
 
@@ -227,41 +228,49 @@ def _fitted(axis: Array, rise: Array, peak: int, left: int, right: int) -> tuple
 
 
 def _lines(frequency_map: OrderMap, channel: int, cuts: Sequence[OrderCut]) -> list[FixedFrequency]:
-    from scipy import ndimage, signal
+    from scipy import signal
 
     level = 10.0 * np.log10(np.maximum(frequency_map.mean_square[channel].astype(np.float64), 1e-300))
     usable = frequency_map.n_frames[channel] > 0
     level, speeds = level[usable], frequency_map.speeds_hz[usable]
     if level.shape[0] < 3:
         return []
-    beside = ndimage.median_filter(level, size=(1, 41), mode="nearest")
-    rise = level - beside
-    near = np.abs(frequency_map.axis - np.array([[cut.order] for cut in cuts])[:, :, None] * speeds[:, None])
-    owned = (near < 3.0 * frequency_map.resolution).any(axis=0)
+    rise = level - beside(level)
+    owned = np.zeros(rise.shape, dtype=bool)
+    for order in {cut.order for cut in cuts}:
+        owned |= np.abs(frequency_map.axis - order * speeds[:, None]) < 3.0 * frequency_map.resolution
     rise = np.where(owned, np.nan, rise)
     with np.errstate(invalid="ignore"):
         rows = np.isfinite(rise).sum(axis=0)
         out = np.nansum(rise >= LINE_RISE_DB, axis=0)
+    lobe = math.ceil(frequency_map.frames.main_lobe_lines) + 1
     free = rows >= 3
     middle = np.zeros(rise.shape[1])
-    middle[free] = np.nanmedian(rise[:, free], axis=0)
-    lobe = math.ceil(frequency_map.frames.main_lobe_lines) + 1
+    ordered = np.sort(rise[:, free], axis=0)  # what is no number comes last
+    middle[free] = np.take_along_axis(ordered, (rows[free] // 2)[None], axis=0)[0]
     peaks, _ = signal.find_peaks(middle, height=LINE_RISE_DB, distance=4)
+    peaks = peaks[peaks > lobe + 1]  # below: what is slower than the frames are long, and its flank
     sides = np.array([max(middle[max(0, peak - lobe)], middle[min(middle.size - 1, peak + lobe)]) for peak in peaks])
     if peaks.size:  # as narrow as the window makes it
         peaks = peaks[middle[peaks] - sides >= LINE_RISE_DB]
-    return [
-        FixedFrequency(
-            "line",
-            float(frequency_map.axis[peak]),
-            math.nan,
-            float(middle[peak]),
-            int(out[peak]),
-            int(rows[peak]),
-            float(out[peak] / rows[peak]),
-            f"a line at {frequency_map.axis[peak]:.4g} Hz stands out in {out[peak]} of {rows[peak]} classes of speed; "
-            "a line has no loss factor",
+    found = []
+    for peak in peaks[out[peaks] >= LINE_ROWS * rows[peaks]].tolist():
+        frequency = _between(middle, peak) * frequency_map.resolution
+        words = (
+            f"a line at {frequency:.4g} Hz stands out in {out[peak]} of {rows[peak]} classes of speed; "
+            "a line has no loss factor"
         )
-        for peak in peaks
-        if out[peak] >= LINE_ROWS * rows[peak]
-    ]
+        confidence = float(out[peak] / rows[peak])
+        found.append(
+            FixedFrequency(
+                "line", frequency, math.nan, float(middle[peak]), int(out[peak]), int(rows[peak]), confidence, words
+            )
+        )
+    return found
+
+
+def _between(middle: Array, peak: int) -> float:
+    """Place of a peak between the lines, by the parabola through three levels."""
+    left, top, right = (float(value) for value in middle[max(0, peak - 1) : peak + 2])
+    bend = left - 2.0 * top + right
+    return peak + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)

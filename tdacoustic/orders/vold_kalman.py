@@ -368,7 +368,7 @@ class VoldKalman:
         width = max(3, round(4.0 / band))
         power = ndimage.uniform_filter1d(left.real**2 + left.imag**2, width, axis=0, mode="nearest")
         variance = power[1:-1][span] / seen * inverse[:, None] * (1.0 - 0.5 / self.poles)
-        return np.asarray(np.sqrt(variance).T)
+        return np.asarray(np.sqrt(np.maximum(variance, 0.0)).T)  # without any data: rounding of either sign
 
     def _reasons(
         self, order: TrackedOrder, reason: NDArray[np.int8], inflated: Array, done: int, last: bool

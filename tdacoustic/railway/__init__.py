@@ -1,6 +1,14 @@
 """The quantities of ISO 3095 and ISO 3381 that logs allow, and why the others are not to be had."""
 
 from tdacoustic.railway.conditions import Conditions, Finding
+from tdacoustic.railway.measures import (
+    PositionResult,
+    RailwayMeasures,
+    RunQuantity,
+    UnitResult,
+    repeated,
+    unit_results,
+)
 from tdacoustic.railway.quantities import (
     Passage,
     Quantity,
@@ -31,20 +39,26 @@ __all__ = [
     "Conditions",
     "Finding",
     "Passage",
+    "PositionResult",
     "Quantity",
+    "RailwayMeasures",
     "Repetition",
     "Rule",
+    "RunQuantity",
     "Standard",
     "Uncertainty",
+    "UnitResult",
     "braking",
     "constant_speed",
     "decisive",
     "expanded_uncertainty_db",
     "pass_by",
+    "repeated",
     "repetition",
     "rounded_db",
     "starting",
     "stationary",
     "transit_exposure",
     "unit_level_db",
+    "unit_results",
 ]

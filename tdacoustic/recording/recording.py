@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from tdacoustic.errors import AnalysisError
 from tdacoustic.recording.log import Log
 
-__all__ = ["Channel", "Recording"]
+__all__ = ["Channel", "Recording", "span_of"]
 
 
 @dataclass(frozen=True)
@@ -90,6 +90,13 @@ class Channel:
     def raster_key(self) -> tuple[int, float, int, int, float]:
         """Channels with the same key can be read together."""
         return (self.log_index, self.sample_rate_hz, self.start_sample, self.n_samples, self.start_s)
+
+
+def span_of(channels: Sequence[Channel]) -> tuple[float, float] | None:
+    """Return the first and the last instant of any channel on the recording's time axis; None of no channel."""
+    if not channels:
+        return None
+    return min(item.start_s for item in channels), max(item.start_s + item.duration_s for item in channels)
 
 
 @dataclass(frozen=True)

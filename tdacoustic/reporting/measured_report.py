@@ -5,15 +5,20 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Fact, Notice, Section
 from tdacoustic.reporting.sections.answer import answer
+from tdacoustic.reporting.sections.contributions import contributions
 from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.levels import levels
 from tdacoustic.reporting.sections.measured import measured
+from tdacoustic.reporting.sections.modes import modes
+from tdacoustic.reporting.sections.orders import orders
 from tdacoustic.reporting.sections.provenance import provenance
 from tdacoustic.reporting.sections.quality import quality
+from tdacoustic.reporting.sections.railway import railway
 from tdacoustic.reporting.sections.side_by_side import side_by_side
 from tdacoustic.reporting.sections.sources import sources
 from tdacoustic.reporting.sections.spectra import spectra
 from tdacoustic.reporting.sections.speed import speed
+from tdacoustic.reporting.sections.tones import tones
 from tdacoustic.results import Analysis
 
 __all__ = ["MEASURED_FOOTER", "measured_facts", "measured_report", "measured_sections"]
@@ -69,10 +74,20 @@ def measured_sections(analysis: Analysis) -> list[Section]:
     analysis : Analysis
     """
     beside = side_by_side(analysis)
-    found = [beside, sources(analysis), kinematics(analysis), measured(analysis), quality(analysis)]
+    found = [
+        beside,
+        sources(analysis),
+        kinematics(analysis),
+        contributions(analysis),
+        modes(analysis),
+        tones(analysis),
+        railway(analysis),
+    ]
+    found += [measured(analysis), quality(analysis)]
     if len(analysis.tables["levels"]):
         found.append(levels(analysis))
     if any(run.measurement is not None for run in analysis.runs):
         found.append(spectra(analysis, fold=beside is not None))
+    found.append(orders(analysis))
     found.append(speed(analysis))
     return [section for section in found if section is not None]

@@ -6,12 +6,18 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
-from tdacoustic.attribution import Dominance, RunKinematics, SourceLine
+from tdacoustic.attribution import Dominance, RunKinematics, RunSlip, SourceLine
+from tdacoustic.attribution.contributions import CampaignContributions
+from tdacoustic.attribution.kinds_of_evidence import ConditionAgreement
+from tdacoustic.attribution.mode_comparison import SpeedModes
 from tdacoustic.campaign import Campaign
 from tdacoustic.errors import AnalysisError
 from tdacoustic.fleet import Fleet
 from tdacoustic.measured import ChannelResult
+from tdacoustic.measured.order_results import RunOrders
 from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.measured.tonality import Tonality
+from tdacoustic.railway import RailwayMeasures
 from tdacoustic.spectra import Spectrum
 from tdacoustic.steps import Record
 from tdacoustic.steps.record import versions
@@ -43,7 +49,7 @@ class Analysis:
     sources : tuple of SourceLine
     dominance : tuple of Dominance
     tables : mapping of str to DataFrame
-        ``quality``, ``levels``, ``bands``, ``lines``, ``sources``, ``dominance``.
+        ``quality``, ``levels``, ``bands``, ``lines``, ``sources``, ``dominance``, ``speeds``, and what else there is.
     problems : tuple of str
         What could not be done, one line each.
     inputs : tuple of LogInput
@@ -52,6 +58,20 @@ class Analysis:
     fleet : Fleet or None
     kinematics : mapping of str to RunKinematics
         By steady run; empty without a fleet.
+    slips : mapping of str to tuple of RunSlip
+        By run, where it has several speeds.
+    tonality : Tonality or None
+        Tones and levels over time of the microphones; None without a second pass.
+    railway : RailwayMeasures or None
+        None where the campaign asks for nothing of the railway standards.
+    orders : mapping of str to RunOrders
+        By run whose shaft's turns are known.
+    contributions : CampaignContributions or None
+        None where no run has sensors and microphones on one raster, or without a second pass.
+    modes : tuple of SpeedModes, or None
+        Traction, braking and coasting at one speed; None where no runs can be compared.
+    agreements : mapping of str to ConditionAgreement
+        By condition, the kinds of evidence on its dominant source; empty without a second pass.
 
     Examples
     --------
@@ -68,6 +88,13 @@ class Analysis:
     records: tuple[tuple[str, Record], ...]
     fleet: Fleet | None = None
     kinematics: Mapping[str, RunKinematics] = field(default_factory=dict)
+    slips: Mapping[str, tuple[RunSlip, ...]] = field(default_factory=dict)
+    tonality: Tonality | None = None
+    railway: RailwayMeasures | None = None
+    orders: Mapping[str, RunOrders] = field(default_factory=dict)
+    contributions: CampaignContributions | None = None
+    modes: tuple[SpeedModes, ...] | None = None
+    agreements: Mapping[str, ConditionAgreement] = field(default_factory=dict)
 
     def result(self, run: str, channel: str) -> ChannelResult:
         """Return spectrum, levels and lines of a channel of a run.

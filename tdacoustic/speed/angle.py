@@ -48,6 +48,8 @@ class ShaftAngle:
         turns over a break is nominal, so a phase is comparable within one stretch alone.
     notes : tuple of str
         What is odd about it, one sentence each.
+    channel : str
+        Where it comes from.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class ShaftAngle:
     speeds_hz: Array | None = None
     breaks: tuple[tuple[float, float], ...] = ()
     notes: tuple[str, ...] = ()
+    channel: str = ""
 
     def __post_init__(self) -> None:
         times, turns = (np.array(values, dtype=np.float64) for values in (self.times_s, self.turns))
@@ -143,8 +146,9 @@ class ShaftAngle:
     ) -> ShaftAngle:
         """Return the angle as the integral of a speed that is linear between its instants.
 
-        Stretches that turn more slowly than `lowest_hz` are breaks; those that turn backwards are counted upwards, and
-        a note says so. The count starts at 0: it has no mark on the shaft, and phases are relative.
+        Stretches that turn more slowly than `lowest_hz`, or whose speed is not known, are breaks; those that turn
+        backwards are counted upwards, and a note says so. The count starts at 0: it has no mark on the shaft, and
+        phases are relative.
 
         Parameters
         ----------
@@ -169,7 +173,7 @@ class ShaftAngle:
             raise AnalysisError(
                 f"channel {profile.channel!r} is a speed in {profile.si_symbol}; an angle needs turns_per_unit"
             )
-        stretches = [piece for piece in _turning(speed, lowest_hz) if piece.size >= 2]
+        stretches = [piece for piece in _turning(speed, lowest_hz, _after_unknown(profile)) if piece.size >= 2]
         if not stretches:
             raise AnalysisError(f"channel {profile.channel!r}: the shaft never turns by {lowest_hz:g} Hz or more")
         backwards = [piece for piece in stretches if speed[piece[0]] < 0.0]
@@ -179,12 +183,13 @@ class ShaftAngle:
         ends = np.cumsum([piece.size for piece in stretches])[:-1]
         breaks = tuple((float(times[end - 1]), float(times[end])) for end in ends)
         notes = tuple(
-            f"below {lowest_hz:g} Hz or turning round from {first:.3f} s to {last:.3f} s" for first, last in breaks
+            f"below {lowest_hz:g} Hz, turning round or not known from {first:.3f} s to {last:.3f} s"
+            for first, last in breaks
         ) + tuple(
             f"turns backwards from {profile.times_s[piece[0]]:.3f} s to {profile.times_s[piece[-1]]:.3f} s"
             for piece in backwards
         )
-        return cls(times, turns, shaft or profile.shaft, speed, breaks, (*profile.notes, *notes))
+        return cls(times, turns, shaft or profile.shaft, speed, breaks, (*profile.notes, *notes), profile.channel)
 
     @property
     def first_s(self) -> float:
@@ -323,8 +328,14 @@ def _gaps(edges: Array) -> NDArray[np.intp]:
     return np.flatnonzero(step > BREAK_ABOVE * np.maximum(left, right))
 
 
-def _turning(speed: Array, lowest_hz: float) -> list[NDArray[np.intp]]:
-    """Indices of the stretches that turn one way at `lowest_hz` or more."""
+def _after_unknown(profile: SpeedProfile) -> NDArray[np.intp]:
+    """Places of the first values after spans in which the speed is not known."""
+    ends = np.array([last for _, last, _ in profile.unknown])
+    return np.searchsorted(profile.times_s, ends - 1e-12).astype(np.intp)
+
+
+def _turning(speed: Array, lowest_hz: float, after: NDArray[np.intp]) -> list[NDArray[np.intp]]:
+    """Indices of the stretches that turn one way at `lowest_hz` or more, cut at places besides."""
     way = np.where(np.abs(speed) >= lowest_hz, np.sign(speed), 0.0)
-    cuts = np.flatnonzero(np.diff(way)) + 1
+    cuts = np.unique(np.concatenate((np.flatnonzero(np.diff(way)) + 1, after[(after > 0) & (after < speed.size)])))
     return [piece for piece in np.split(np.arange(speed.size), cuts) if way[piece[0]] != 0.0]

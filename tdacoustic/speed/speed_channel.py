@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
+
+from tdacoustic.errors import AnalysisError
+from tdacoustic.speed.profile import STANDSTILL, SpeedProfile
 
 __all__ = ["SpeedChannelMeter"]
 
@@ -43,3 +47,50 @@ class SpeedChannelMeter:
         times = (np.arange(means.size, dtype=np.float64) * size + 0.5 * (size - 1)) / self._rate_hz
         finite = np.isfinite(means)
         return times[finite], np.asarray(means[finite], dtype=np.float64)
+
+    def profile(self, name: str, shaft: str | None, si_symbol: str, start_s: float = 0.0) -> SpeedProfile:
+        """Return the speed on the run's time axis, on which the first sample is at `start_s`.
+
+        Its error is the scatter of its values; where the channel holds no numbers for a while, it is not known.
+
+        Raises
+        ------
+        AnalysisError
+            A channel without any number.
+        """
+        times, values = self.result()
+        if values.size == 0:
+            raise AnalysisError(f"speed channel {name!r} holds no numbers")
+        step = self._size / self._rate_hz
+        holes = np.flatnonzero(np.diff(times) > 1.5 * step)
+        unknown = tuple(
+            (start_s + float(times[at]), start_s + float(times[at + 1]), "the channel holds no numbers") for at in holes
+        )
+        faults = tuple(f"not known from {first:.2f} s to {last:.2f} s: {why}" for first, last, why in unknown)
+        notes = list(faults)
+        turned = np.sign(values[np.abs(values) > STANDSTILL.get(si_symbol, 0.0)])
+        if turned.size and turned.min() < 0.0 < turned.max():
+            notes.append("its sign changes: the direction is turned round")
+        return SpeedProfile(
+            name,
+            shaft,
+            si_symbol,
+            start_s + times,
+            values,
+            tuple(notes),
+            doubtful=bool(unknown),
+            error=_scatter(times, values),
+            unknown=unknown,
+            faults=faults,
+        )
+
+
+def _scatter(times: Array, values: Array) -> Array | None:
+    """Standard error of each value by its distance from the line between its neighbours, robust over nine of them."""
+    if values.size < 9:
+        return None
+    part = (times[1:-1] - times[:-2]) / (times[2:] - times[:-2])
+    off = np.abs(values[1:-1] - (values[:-2] + part * (values[2:] - values[:-2])))
+    # Of independent values that distance has the variance 1 + 1/4 + 1/4.
+    usual = 1.4826 * ndimage.median_filter(off, 9, mode="nearest") / np.sqrt(1.5)
+    return np.concatenate((usual[:1], usual, usual[-1:]))

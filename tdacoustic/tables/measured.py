@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from tdacoustic.attribution import Dominance, RunKinematics, SourceLine
+from tdacoustic.attribution.kinds_of_evidence import ConditionAgreement
 from tdacoustic.campaign import Campaign
 from tdacoustic.measured.levels import ConditionLevels, RunLevel
 from tdacoustic.measured.results import ChannelResult
@@ -28,6 +29,7 @@ def measured_tables(
     sources: Sequence[SourceLine],
     dominance: Sequence[Dominance],
     kinematics: Mapping[str, RunKinematics],
+    agreements: Mapping[str, ConditionAgreement] | None = None,
 ) -> dict[str, pd.DataFrame]:
     """Return ``quality``, ``levels``, ``bands``, ``lines``, ``sources`` and ``dominance`` as frames.
 
@@ -42,6 +44,8 @@ def measured_tables(
         Of the attribution.
     kinematics : mapping of str to RunKinematics
         By run; empty without a fleet.
+    agreements : mapping of str to ConditionAgreement, optional
+        By condition.
     """
     tested = [run for run in runs if run.run.kind == "test" and run.measurement is not None]
     rows: dict[str, Iterable[Row]] = {
@@ -50,7 +54,7 @@ def measured_tables(
         "bands": _band_rows(tested),
         "lines": _line_rows(tested, kinematics),
         "sources": _source_rows(sources),
-        "dominance": _dominance_rows(dominance, levels),
+        "dominance": _dominance_rows(dominance, levels, agreements or {}),
     }
     if kinematics:
         rows["kinematics"] = _kinematic_rows(tested, kinematics)
@@ -180,7 +184,36 @@ def _source_rows(sources: Sequence[SourceLine]) -> Iterator[Row]:
         }
 
 
-def _dominance_rows(dominance: Sequence[Dominance], levels: ConditionLevels) -> Iterator[Row]:
+def _agreement_columns(found: ConditionAgreement | None) -> Row:
+    """The kinds of evidence on the largest source, each alone, and how far they agree.
+
+    ``<kind>_dominant`` is the likeliest source by that kind alone and ``<kind>_confidence`` its probability, both empty
+    where the kind is silent; of the contributions ``unexplained`` where no sensor explains most, ``undecided`` where
+    the probability is below 0.9. ``evidence_agreement``: ``agree``, ``disagree``, ``single`` or ``silent``;
+    ``evidence_source`` and ``evidence_joint``: the source by all kinds together and its probability.
+    """
+    if found is None:
+        return {}
+    silent = found.agreement.silent
+    sensor, order = ((None, None) if kind in silent else found.leading(kind) for kind in ("sensor", "order"))
+    contribution = found.leading("contribution")
+    return {
+        "sensor_dominant": sensor[0],
+        "sensor_confidence": sensor[1],
+        "order_dominant": order[0],
+        "order_confidence": order[1],
+        "contribution_dominant": found.contribution_dominant,
+        "contribution_confidence": contribution[1],
+        "evidence_agreement": found.agreement.word,
+        "evidence_source": found.agreement.source,
+        "evidence_joint": found.agreement.probability,
+        "evidence_words": "; ".join(part for part in (found.agreement.words, found.contribution_words) if part),
+    }
+
+
+def _dominance_rows(
+    dominance: Sequence[Dominance], levels: ConditionLevels, agreements: Mapping[str, ConditionAgreement]
+) -> Iterator[Row]:
     for verdict in dominance:
         yield {
             "condition": verdict.condition,
@@ -194,4 +227,5 @@ def _dominance_rows(dominance: Sequence[Dominance], levels: ConditionLevels) -> 
             "leading": verdict.leading,
             "n_runs": float(verdict.n_runs),
             "spread_db": verdict.spread_db,
+            **_agreement_columns(agreements.get(verdict.condition)),
         }

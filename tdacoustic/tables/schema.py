@@ -24,6 +24,17 @@ COLUMNS: Final = MappingProxyType(
         "evidence order_name frequency_error_hz prominence_db",
         "kinematics": "run condition train_speed_km_h motor_speed_rpm speed_source mesh_frequency_hz "
         "observed_mesh_frequency_hz observed_mesh_error_hz mesh_excess causes",
+        "tones": "run condition channel method frequency_hz frequency_error_hz level_db value_db criterion_db "
+        "prominent audible combined_into_hz n_spectra order owner excitation notes weighting speed_from speed_to "
+        "speed_unit",
+        "tonality": "run condition channel method mean_audibility_db uncertainty_db adjustment_db n_spectra notes "
+        "speed_from speed_to speed_unit",
+        "railway": "run condition channel standard test symbol level_db corrected_db reason state findings start_s "
+        "end_s n_runs spread_db reported_db decisive",
+        "speeds": "run condition channel shaft source mean min max unit error confidence known_share first_s last_s "
+        "beside_leading reason notes",
+        "slip": "run condition train_channel shaft_channel shaft usual_slip error n_events worst_event worst_slip "
+        "worst_from_s worst_to_s from_s to_s like_delay_s reason notes",
         "conditions": "condition train_speed_km_h motor_speed_rpm mesh_frequency_hz torque_n_m dte_pp_um floquet_max "
         "masuda_spl_1m_db motor_sound_power_level_db structure_spl_4m_db mesh_spl_4m_db motor_spl_4m_db spl_4m_db "
         "mode power_kw method periodic repeats_after_mesh_periods contact_part static_compression_um "
@@ -58,8 +69,23 @@ COLUMNS: Final = MappingProxyType(
         "sweep_points": "sweep point parameter value words reason",
         "sweeps": "sweep point condition train_speed_km_h parameters structure_spl_4m_db mesh_spl_4m_db "
         "motor_spl_4m_db spl_4m_db masuda_spl_1m_db dte_pp_um range_12m_db loudest_deg reason",
+        "orders": "run condition channel order speed_rpm level_db name kind shaft bandwidth_orders requested_bandwidth "
+        "level_error_db floor_db phase_deg phase_error_deg steadiness method reason",
+        "sidebands": "run condition channel carrier carrier_order spacing spacing_orders speed_rpm pairs sidebands_db "
+        "amplitude_depth phase_depth_rad reason",
+        "resonances": "run condition channel kind frequency_hz width_hz rise_db raised crossing confidence orders detail",
+        "synchronous": "run condition channel shaft turns speed_rpm synchronous_db residual_db harmonic order name "
+        "level_db level_error_db phase_deg phase_error_deg reason",
+        "contributions": "run condition train_speed_km_h channel span kind order low_hz high_hz part level_db low_db "
+        "high_db path_level_db verdict reason probability_largest n_states",
+        "coherence": "run condition train_speed_km_h kind reference other frequency_hz span value corrected low high "
+        "averages reason",
+        "modes": "train_speed_km_h channel band mode level_db torque_share low high depends_on words motor_speed_rpm "
+        "speed_level_db torque_level_db runs scatter_assumed",
         "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
-        "unassigned_share line_fraction dominant_excitation confidence leading n_runs spread_db",
+        "unassigned_share line_fraction dominant_excitation confidence leading n_runs spread_db sensor_dominant "
+        "sensor_confidence order_dominant order_confidence contribution_dominant contribution_confidence "
+        "evidence_agreement evidence_source evidence_joint evidence_words",
     }
 )
 """Columns by table, separated by spaces."""
@@ -76,6 +102,12 @@ TEXT_COLUMNS: Final = frozenset(
         *("mode", "method", "gear", "direction", "receiver", "path", "sweep"),
         *("coupling", "plane", "place", "case"),
         *("unit", "difference_unit", "margin_unit"),
+        *("name", "carrier", "spacing", "orders"),
+        *("owner", "notes", "speed_unit", "standard", "test", "symbol", "state", "findings"),
+        *("shaft", "train_channel", "shaft_channel", "worst_event"),
+        *("span", "part", "other", "band", "depends_on", "runs"),
+        *("sensor_dominant", "order_dominant", "contribution_dominant"),
+        *("evidence_agreement", "evidence_source", "evidence_words"),
     }
 )
 """Columns that hold words, even where the words are digits."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,15 @@ from tdacoustic.tones.audibility import (
 from tdacoustic.tones.critical_bands import hearing_threshold_db
 from tdacoustic.tones.narrow_band import AVERAGING_S, LINE_SPACING_HZ, ShortTimeMeter
 
-__all__ = ["Audibility", "AudibilityMeter", "RatedTone", "mean_audibility", "tone_adjustment_db"]
+__all__ = [
+    "Audibility",
+    "AudibilityMeter",
+    "RatedTone",
+    "SightedTone",
+    "mean_audibility",
+    "rated_tone",
+    "tone_adjustment_db",
+]
 
 Array = NDArray[np.float64]
 
@@ -33,6 +41,19 @@ ADJUSTMENT: Final = ((0.0, 0), (2.0, 1), (4.0, 2), (6.0, 3), (9.0, 4), (12.0, 5)
 of ISO 1996-2:2017, table J.1)."""
 SAME_TONE_LINES: Final = 1.0
 """Tones of two spectra no farther apart than this many lines are one tone [assumed]."""
+
+
+class SightedTone(Protocol):
+    """A tone in one spectrum; `AudibleTone` is one."""
+
+    @property
+    def frequency_hz(self) -> float: ...  # noqa: D102
+    @property
+    def frequency_error_hz(self) -> float: ...  # noqa: D102
+    @property
+    def level_db(self) -> float: ...  # noqa: D102
+    @property
+    def audibility_db(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
@@ -246,10 +267,19 @@ def _over_spectra(spectra: Sequence[SpectrumTones], spacing_hz: float) -> tuple[
             group[index] = tone
         else:
             groups.append({index: tone})
-    return tuple(_summary(list(group.values()), len(spectra)) for group in groups)
+    return tuple(rated_tone(list(group.values()), len(spectra)) for group in groups)
 
 
-def _summary(held: Sequence[AudibleTone], n_spectra: int) -> RatedTone:
+def rated_tone(held: Sequence[SightedTone], n_spectra: int) -> RatedTone:
+    """Return one tone over several spectra.
+
+    Parameters
+    ----------
+    held : sequence of SightedTone
+        The tone in each spectrum that shows it, once; at least one.
+    n_spectra : int
+        All spectra, those without it too.
+    """
     frequencies = np.array([tone.frequency_hz for tone in held])
     errors = np.array([tone.frequency_error_hz for tone in held])
     scatter = float(np.std(frequencies, ddof=1)) if len(held) > 1 else 0.0

@@ -46,6 +46,7 @@ __all__ = [
     "ToneGroup",
     "audible_tones",
     "audible_tones_by",
+    "highest_rated_hz",
 ]
 
 Array = NDArray[np.float64]
@@ -55,6 +56,11 @@ NO_TONE_DB: Final = -10.0
 """Audibility of a spectrum without an audible tone (formula (21))."""
 SILENT_DB: Final = -200.0
 """Level of a line that holds nothing at all."""
+HIGHEST_HZ: Final = 15500.0
+"""Where the critical bands of hearing end, 24 Bark (E. Zwicker, J. Acoust. Soc. Am. 33 (1961) 248), on which the
+standards' bandwidth and masking rest. Whether the standards name an upper limit of their own is not known here [not
+verified against their texts]."""
+UNVERIFIED: Final = "[not verified against the standard's text]"
 
 
 @dataclass(frozen=True)
@@ -68,17 +74,65 @@ class AudibilityMethod:
         Lower tones are not rated.
     adjustment : bool
         Whether it gives a tone adjustment in decibels.
+    limits : tuple of str
+        What it cannot do, and how far it is known here, one sentence each.
+    highest_hz : float
+        Higher tones are not rated.
     """
 
     name: str
     lowest_hz: float
     adjustment: bool
+    limits: tuple[str, ...] = ()
+    highest_hz: float = HIGHEST_HZ
 
 
-ISO_TS_20065: Final = AudibilityMethod("ISO/TS 20065:2022", 50.0, False)
+_UPPER_LIMIT: Final = (
+    f"Tones above {HIGHEST_HZ:g} Hz are not rated: there the critical bands of hearing end on which the formulas rest; "
+    f"an upper limit of the standard's own is not known {UNVERIFIED}."
+)
+
+ISO_TS_20065: Final = AudibilityMethod(
+    "ISO/TS 20065:2022",
+    50.0,
+    False,
+    (
+        "Tones below 50 Hz are not rated (scope); there, and for screeching, it does not replace a listener.",
+        _UPPER_LIMIT,
+        f"The formulas are those of ISO/PAS 20065:2016; what the edition of 2022 changed is not known {UNVERIFIED}.",
+        "It gives no tone adjustment in decibels.",
+    ),
+)
 """Scope: tones from 50 Hz (BSI's page on the standard); no adjustment."""
-DIN_45681: Final = AudibilityMethod("DIN 45681:2005-03", 90.0, True)
+DIN_45681: Final = AudibilityMethod(
+    "DIN 45681:2005-03",
+    90.0,
+    True,
+    (
+        f"Tones below 90 Hz are not rated (5.3.2, as phonometry read it) {UNVERIFIED}.",
+        _UPPER_LIMIT,
+        "The tone adjustment is that of its table 1, which ISO 1996-2:2017 repeats.",
+    ),
+)
 """Tones from 90 Hz (5.3.2, by phonometry); tone adjustment of its table 1."""
+
+
+def highest_rated_hz(sample_rate_hz: float) -> float:
+    """Return the highest tone whose critical band a sampling rate holds, but no more than `HIGHEST_HZ`.
+
+    Examples
+    --------
+    >>> round(highest_rated_hz(8192.0)), highest_rated_hz(51200.0)
+    (3765, 15500.0)
+    """
+    end_hz = 0.5 * sample_rate_hz
+    if geometric_band(HIGHEST_HZ)[1] <= end_hz:
+        return HIGHEST_HZ
+    low, high = 0.0, HIGHEST_HZ
+    for _ in range(60):  # halved until it is exact
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if geometric_band(middle)[1] <= end_hz else (low, middle)
+    return low
 
 
 @dataclass(frozen=True)
@@ -238,6 +292,8 @@ def _refuse(spectrum: Spectrum, method: AudibilityMethod) -> None:
 def _not_rated(tone: AudibleTone, method: AudibilityMethod, last_hz: float) -> str | None:
     if tone.line_hz < method.lowest_hz:
         return f"below {method.lowest_hz:g} Hz, from which {method.name} rates tones"
+    if tone.line_hz > method.highest_hz:
+        return f"above {method.highest_hz:g} Hz, where the critical bands of hearing end"
     if tone.critical_band_hz[1] > last_hz:
         return f"its critical band ends at {tone.critical_band_hz[1]:.0f} Hz, beyond the spectrum's {last_hz:.0f} Hz"
     return None

@@ -25,7 +25,14 @@ from tdacoustic.tones.critical_bands import (
 )
 from tdacoustic.units import REFERENCES
 
-__all__ = ["RANGE_HZ", "EcmaTone", "EcmaTones", "ecma_tones", "prominence_criterion_db", "ratio_criterion_db"]
+__all__ = [
+    "RANGE_HZ",
+    "EcmaTone",
+    "EcmaTones",
+    "ecma_tones",
+    "prominence_criterion_db",
+    "ratio_criterion_db",
+]
 
 Array = NDArray[np.float64]
 
@@ -57,6 +64,10 @@ _UPPER_EDGE: Final = ((1600.0, (149.5, 1.035, 7.70e-5)), (math.inf, (3.3, 1.215,
 NOTES: Final = (
     "The criteria are numbers; the standard also asks for a listener to confirm that a prominent tone is heard.",
     "Candidates are the lines of the spectrum; the standard names no rule for finding them.",
+    "Tones outside of 89.1 Hz to 11.2 kHz have no criterion and are not rated.",
+    "It rates steady sound: a run whose speed changes has no averaged spectrum and is not rated by it.",
+    "The edition of 2024 is known through phonometry (MIT), which read its clauses and formulas "
+    "[not verified against the standard's text].",
 )
 
 

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final, Protocol
 
-__all__ = ["OWNERS", "ExpectedTone", "ToneLabel", "ToneLike", "label_tones", "matching_tolerance_hz"]
+__all__ = ["OWNERS", "Excited", "ExpectedTone", "ToneLabel", "ToneLike", "expected_tones", "label_tones"]
 
 SIGMAS: Final = 3.0
 """Standard deviations within which a tone counts as an expected one; as in `lines.families`."""
+
+CROWDED: Final = 0.25
+"""An expected tone's reach over the distance to the next one of its own family, from which on any tone would fall on
+the family somewhere and none is named by it [assumed: by chance at most half of all tones would]."""
 
 OWNERS: Final[Mapping[str, str]] = MappingProxyType(
     {"mesh": "gearbox", "motor": "motor", "inverter": "motor", "wheelset": "wheelset"}
@@ -28,8 +32,8 @@ class ToneLike(Protocol):
     def frequency_error_hz(self) -> float: ...  # noqa: D102
 
 
-class ExpectedTone(Protocol):
-    """What is expected at a motor speed; `fleet.Excitation` is one."""
+class Excited(Protocol):
+    """What the kinematics expects at a motor speed; `fleet.Excitation` is one."""
 
     @property
     def name(self) -> str: ...  # noqa: D102
@@ -38,77 +42,96 @@ class ExpectedTone(Protocol):
     @property
     def frequency_hz(self) -> float: ...  # noqa: D102
     @property
-    def order(self) -> float | None: ...  # noqa: D102
+    def harmonic(self) -> int: ...  # noqa: D102
     @property
     def hz_per_motor_hz(self) -> float: ...  # noqa: D102
 
 
 @dataclass(frozen=True)
+class ExpectedTone:
+    """A frequency at which a tone of known origin may lie.
+
+    Parameters
+    ----------
+    name : str
+        As ``"mesh x2"``.
+    kind : str
+        Of the excitation, a key of `OWNERS`.
+    frequency_hz, error_hz : float
+        One standard deviation: of the speed, by how much the frequency follows it.
+    harmonic : float
+        Multiple of its family's first; 1 where it stands alone.
+    """
+
+    name: str
+    kind: str
+    frequency_hz: float
+    error_hz: float
+    harmonic: float = 1.0
+
+
+def expected_tones(
+    excitations: Sequence[Excited], motor_hz: float, motor_hz_error: float, fixed_error: float = 0.0
+) -> tuple[ExpectedTone, ...]:
+    """Return excitations with the error that the motor's speed leaves.
+
+    Parameters
+    ----------
+    excitations : sequence of Excited
+        At one motor speed.
+    motor_hz, motor_hz_error : float
+        Turns of the motor per second and one standard deviation: a tacho's 1e-4 of them, a stated train speed's
+        5e-3 (`attribution.kinematic`), and the scatter within the time that the tones are of.
+    fixed_error : float
+        Relative standard deviation of the part that does not follow the motor, an inverter's carrier.
+    """
+    found = []
+    for item in excitations:
+        standing_hz = abs(item.frequency_hz - item.hz_per_motor_hz * motor_hz)
+        error_hz = abs(item.hz_per_motor_hz) * motor_hz_error + standing_hz * fixed_error
+        found.append(ExpectedTone(item.name, item.kind, item.frequency_hz, error_hz, float(item.harmonic)))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
 class ToneLabel:
-    """Order and owner of one tone.
+    """Origin of one tone.
 
     Parameters
     ----------
     excitation : str or None
-        Name of the nearest expected excitation within reach; None where there is none.
+        Name of the nearest expected tone within reach; None where there is none.
     owner : str or None
         Component that it belongs to.
-    order : float or None
-        Expected order per turn of the motor; without an excitation, the tone's own frequency over the motor's, None
-        where the motor stands.
     distance_hz : float or None
         Tone minus expected frequency.
     tolerance_hz : float or None
         Reach that was allowed.
     also : tuple of str
-        Other excitations within their reach, the nearest first: with any of another owner the label is ambiguous.
+        Others within their reach, the nearest first: with any of another owner the label is ambiguous.
     ambiguous : bool
     """
 
     excitation: str | None
     owner: str | None
-    order: float | None
-    distance_hz: float | None
-    tolerance_hz: float | None
+    distance_hz: float | None = None
+    tolerance_hz: float | None = None
     also: tuple[str, ...] = ()
     ambiguous: bool = False
 
 
-def matching_tolerance_hz(
-    tone: ToneLike, expected: ExpectedTone, motor_hz_error: float, sigmas: float = SIGMAS
-) -> float:
-    """Return how far a tone may lie beside an expected frequency.
-
-    So many standard deviations of the tone's own frequency and of the speed, by how much the
-    expected frequency follows it.
-
-    Parameters
-    ----------
-    tone : ToneLike
-    expected : ExpectedTone
-    motor_hz_error : float
-        One standard deviation of the motor's turns per second: a tacho's 1e-4 of them, a stated train speed's
-        5e-3 (`attribution.kinematic`), and the scatter within the run.
-    """
-    return sigmas * math.hypot(tone.frequency_error_hz, expected.hz_per_motor_hz * motor_hz_error)
-
-
 def label_tones(
-    tones: Sequence[ToneLike],
-    expected: Sequence[ExpectedTone],
-    motor_hz: float,
-    motor_hz_error: float,
-    owners: Mapping[str, str] = OWNERS,
+    tones: Sequence[ToneLike], expected: Sequence[ExpectedTone], owners: Mapping[str, str] = OWNERS
 ) -> tuple[ToneLabel, ...]:
-    """Give each tone the order and owner of the expected excitation that lies nearest, in standard deviations.
+    """Give each tone the origin of the expected tone that lies nearest, in standard deviations.
+
+    A tone may lie beside an expected one by `SIGMAS` standard deviations of both. Of a family whose members' reach
+    fills much of the distance between them (`CROWDED`) none is named.
 
     Parameters
     ----------
     tones : sequence of ToneLike
     expected : sequence of ExpectedTone
-        At `motor_hz`, as `Kinematics.excitations` gives them.
-    motor_hz, motor_hz_error : float
-        Turns of the motor per second and one standard deviation.
     owners : mapping of str to str
         Component by kind of excitation.
 
@@ -117,28 +140,25 @@ def label_tones(
     tuple of ToneLabel
         In the order of the tones.
     """
-    return tuple(_label(tone, expected, motor_hz, motor_hz_error, owners) for tone in tones)
+    return tuple(_label(tone, expected, owners) for tone in tones)
 
 
-def _label(
-    tone: ToneLike, expected: Sequence[ExpectedTone], motor_hz: float, motor_hz_error: float, owners: Mapping[str, str]
-) -> ToneLabel:
+def _label(tone: ToneLike, expected: Sequence[ExpectedTone], owners: Mapping[str, str]) -> ToneLabel:
     within = []
     for candidate in expected:
-        tolerance = matching_tolerance_hz(tone, candidate, motor_hz_error)
+        tolerance = SIGMAS * math.hypot(tone.frequency_error_hz, candidate.error_hz)
         distance = tone.frequency_hz - candidate.frequency_hz
-        if abs(distance) <= tolerance:
+        crowded = tolerance > CROWDED * candidate.frequency_hz / max(1.0, candidate.harmonic)
+        if abs(distance) <= tolerance and not crowded:
             within.append((abs(distance) / tolerance if tolerance > 0.0 else 0.0, distance, tolerance, candidate))
-    own_order = tone.frequency_hz / motor_hz if motor_hz > 0.0 else None
     if not within:
-        return ToneLabel(None, None, own_order, None, None)
+        return ToneLabel(None, None)
     within.sort(key=lambda entry: entry[0])
     _, distance, tolerance, best = within[0]
     owner = owners.get(best.kind)
     return ToneLabel(
         best.name,
         owner,
-        best.order if best.order is not None else own_order,
         distance,
         tolerance,
         tuple(entry[3].name for entry in within[1:]),

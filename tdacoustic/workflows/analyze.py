@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tdacoustic.results import Analysis, LogInput
     from tdacoustic.steps import Record
     from tdacoustic.workflows.runs import PreparedRun
+    from tdacoustic.workflows.second_pass import FirstPass, SecondPass
 
 __all__ = ["analyze"]
 
@@ -33,6 +34,7 @@ def analyze(
     progress: Progress | None = None,
     *,
     without_runs: bool = False,
+    deeper: bool = True,
 ) -> Analysis:
     """Analyse the logs of a campaign.
 
@@ -46,6 +48,8 @@ def analyze(
     progress : callable, optional
     without_runs : bool
         Go on where no run can be used: for who has more to do than to analyse.
+    deeper : bool
+        Whether the second pass is made too: orders, tones, contributions.
 
     Returns
     -------
@@ -59,19 +63,23 @@ def analyze(
         The campaign or its fleet is wrong, or (unless `without_runs`) no run can be used.
     """
     from tdacoustic.steps import execute, lineage, result_of
+    from tdacoustic.workflows.order_tracking import order_problems
+    from tdacoustic.workflows.run_speeds import check_speeds, speed_problems
     from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems, written_inputs
+    from tdacoustic.workflows.second_pass import FirstPass, SecondPass, second_pass
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     fleet, problems = _fleet(campaign)
     prepared = prepare_runs(campaign, store, without_runs)
     tasks = {item.run.name: item.task for item in prepared if item.task is not None}
-    outcome = execute(list(tasks.values()), store, _jobs(prepared) if jobs is None else jobs, progress)
+    n_jobs = _jobs(prepared) if jobs is None else jobs
+    outcome = execute(list(tasks.values()), store, n_jobs, progress)
     failures = {name: outcome.failed[task.key] for name, task in tasks.items() if task.key in outcome.failed}
     if not without_runs:
         _raise_if_all_failed(failures, len(tasks))
     by_name = {item.run.name: item for item in prepared}
-    runs = tuple(gather_run(run, by_name.get(run.name), failures, store) for run in campaign.runs)
+    runs = check_speeds([gather_run(run, by_name.get(run.name), failures, store) for run in campaign.runs], fleet)
     evidence: dict[str, RunEvidence] = {}
     records: dict[str, Record] = {}
     for name, task in tasks.items():
@@ -79,9 +87,13 @@ def analyze(
             if by_name[name].evidence is not None:
                 evidence[name] = result_of(task, store)
             records.update(lineage(task, store))
-    problems += [*run_problems(prepared, failures), *_missing_receivers(campaign, runs), *_not_built(campaign)]
+    first = FirstPass(campaign, fleet, by_name, runs, _kinematics(fleet, runs))
+    second = second_pass(first, store, n_jobs, progress) if deeper else SecondPass()
+    records.update(second.records)
+    problems += [*run_problems(prepared, failures), *speed_problems(campaign, prepared, runs)]
+    problems += [*_missing_receivers(campaign, runs), *_not_built(campaign), *(order_problems(first) if deeper else ())]
     inputs = (*written_inputs(campaign, fleet is not None), *log_inputs(prepared))
-    return _assemble(campaign, fleet, runs, evidence, (problems, inputs, tuple(records.items())))
+    return _assemble(first, second, evidence, ([*problems, *second.problems], inputs, tuple(records.items())))
 
 
 def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:
@@ -120,9 +132,6 @@ def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[
 def _not_built(campaign: Campaign) -> list[str]:
     """What the campaign asks for and this version does not do."""
     found = []
-    if campaign.analysis.orders:
-        orders = ", ".join(f"{order:g}" for order in campaign.analysis.orders)
-        found.append(f"orders {orders} are not cut by this version")
     calibrators = [run.name for run in campaign.runs if run.kind.startswith("calibration") and run.valid]
     if calibrators:
         found.append(f"calibrator runs {', '.join(calibrators)} are checked, but set no sensitivity in this version")
@@ -136,39 +145,81 @@ Origins: TypeAlias = "tuple[list[str], tuple[LogInput, ...], tuple[tuple[str, Re
 
 
 def _assemble(
-    campaign: Campaign,
-    fleet: Fleet | None,
-    runs: tuple[MeasuredRun, ...],
-    evidence: Mapping[str, RunEvidence],
-    origins: Origins,
+    first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEvidence], origins: Origins
 ) -> Analysis:
     """Gather what stands above the single run: background, conditions, sources, dominance, tables."""
     from tdacoustic.attribution import ConditionEvidence, attribute, dominance_of_condition
+    from tdacoustic.attribution.kinds_of_evidence import agreement_of_condition
     from tdacoustic.measured.levels import condition_levels
     from tdacoustic.measured.runs import receivers
     from tdacoustic.results import Analysis
     from tdacoustic.tables import measured_tables
+    from tdacoustic.tables.contributions import contribution_tables
+    from tdacoustic.tables.orders import order_tables
+    from tdacoustic.tables.railway import railway_table
+    from tdacoustic.tables.tones import tone_tables
+    from tdacoustic.workflows.contributions import campaign_contributions, missing_components
+    from tdacoustic.workflows.modes import campaign_modes
+    from tdacoustic.workflows.railway_measures import railway_measures
+    from tdacoustic.workflows.run_speeds import slips_of, speed_frames
+    from tdacoustic.workflows.tonality import tonality
 
+    campaign, fleet, runs, kinematics = first.campaign, first.fleet, first.runs, first.kinematics
     microphones = receivers(runs)
-    kinematics = _kinematics(fleet, runs)
     levels = condition_levels(runs, {name: item.train_speed_km_h for name, item in kinematics.items()})
     components = _components(runs)
     sources: list[SourceLine] = []
     dominance: list[Dominance] = []
+    asked: list[ConditionEvidence] = []
     for condition in campaign.conditions():
         held = [run for run in runs if run.run.condition == condition and run.run.kind == "test"]
         steady = {run.name: evidence[run.name] for run in held if run.name in evidence and _is_steady(run)}
         known = ConditionEvidence(condition, microphones, steady, kinematics, components, fleet is not None)
         found, draws = attribute(known, campaign.excludes, campaign.overrides, _seed(known))
         sources += found
+        asked.append(known)
         energy = _receiver_energy(held, microphones)
         spread_db = levels.spread_db(condition, microphones)
         dominance.append(dominance_of_condition(condition, found, draws, energy, len(steady), spread_db))
     problems, inputs, records = origins
     problems = [*problems, *_unused_overrides(campaign, sources)]
-    tables = measured_tables(campaign, runs, levels, sources, dominance, kinematics)
+    slips = slips_of(runs, fleet)
+    heard = tonality(first, second, sources) if second.made else None
+    railway, not_rated = railway_measures(first, second) if second.made else (None, [])
+    problems += not_rated
+    orders = second.of_kind("orders")
+    contributions, modes = campaign_contributions(first, second), campaign_modes(first, second)
+    problems += missing_components(first) if second.made else []
+    agreements = {
+        known.condition: agreement_of_condition(known, campaign.excludes, _seed(known), contributions)
+        for known in (asked if second.made else ())
+    }
+    tables = {
+        **measured_tables(campaign, runs, levels, sources, dominance, kinematics, agreements),
+        **speed_frames(runs, fleet, slips),
+        **tone_tables(heard),
+        **railway_table(railway),
+        **order_tables(runs, orders),
+        **contribution_tables(contributions, modes),
+    }
     return Analysis(
-        campaign, runs, tuple(sources), tuple(dominance), tables, tuple(problems), inputs, records, fleet, kinematics
+        campaign=campaign,
+        runs=runs,
+        sources=tuple(sources),
+        dominance=tuple(dominance),
+        tables=tables,
+        problems=tuple(problems),
+        inputs=inputs,
+        records=records,
+        fleet=fleet,
+        kinematics=kinematics,
+        slips=slips,
+        tonality=heard,
+        railway=railway,
+        orders=orders,
+        contributions=contributions,
+        modes=modes,
+        agreements=agreements,
     )
 
 

@@ -150,4 +150,4 @@ def _over_speed(
 def _analyzed(campaign: Campaign, store: Store, jobs: int | None, progress: Progress | None) -> Analysis:
     from tdacoustic.workflows.analyze import analyze
 
-    return analyze(campaign, store, jobs, progress)
+    return analyze(campaign, store, jobs, progress, deeper=False)

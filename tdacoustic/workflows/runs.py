@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from tdacoustic.attribution import EVIDENCE, EvidenceSettings
 from tdacoustic.campaign import Campaign, CampaignRun, WrittenPath
@@ -17,6 +18,10 @@ from tdacoustic.quality import Verdict
 from tdacoustic.recording import Channel, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
+
+if TYPE_CHECKING:
+    from tdacoustic.fleet import Fleet
 
 __all__ = [
     "PreparedRun",
@@ -45,6 +50,8 @@ class PreparedRun:
         Why its logs cannot be read.
     flags : tuple of str
         What is odd about its logs.
+    no_lines : str or None
+        Why its speed cannot be read from lines, where it would have to be.
     """
 
     run: CampaignRun
@@ -54,6 +61,7 @@ class PreparedRun:
     logs: tuple[LogFile, ...] = ()
     error: TdacousticError | None = None
     flags: tuple[str, ...] = ()
+    no_lines: str | None = None
 
     @property
     def task(self) -> Task | None:
@@ -69,7 +77,8 @@ def prepare_runs(campaign: Campaign, store: Store, without_runs: bool = False) -
     TdacousticError
         No run can be read (unless `without_runs`), or a channel can be used in no run.
     """
-    prepared = [_prepare(campaign, run, store) for run in campaign.runs if run.valid]
+    fleet = fleet_of(campaign) if campaign.analysis.speed_from != "channels" else None
+    prepared = [_prepare(campaign, run, store, fleet) for run in campaign.runs if run.valid]
     _check_coverage(campaign, prepared, without_runs)
     bound = [item.bound.recording for item in prepared if item.bound is not None]
     microphones = receivers_of(bound)
@@ -93,7 +102,7 @@ def _sensors(recording: Recording) -> tuple[tuple[str, str], ...]:
     return tuple((channel.name, str(channel.component)) for channel in recording.channels if is_sensor(channel))
 
 
-def _prepare(campaign: Campaign, run: CampaignRun, store: Store) -> PreparedRun:
+def _prepare(campaign: Campaign, run: CampaignRun, store: Store, fleet: Fleet | None) -> PreparedRun:
     """Scan and hash a run's logs, bind its channels, make its task."""
     try:
         scanned = tuple(scan(log.path) for log in run.logs)
@@ -112,10 +121,12 @@ def _prepare(campaign: Campaign, run: CampaignRun, store: Store) -> PreparedRun:
         stated=_stated_speeds(run),
     )
     frames = FrameSettings(analysis.frequency_resolution_hz, analysis.overlap, analysis.run_up_resolution_hz)
-    task = measurement_task(f"run {run.name}", settings, frames, logs)
+    lines = line_speed_settings(campaign, run, bound.recording, fleet)
+    no_lines = lines if isinstance(lines, str) else None
+    task = measurement_task(f"run {run.name}", settings, frames, logs, None if isinstance(lines, str) else lines)
     flags = [f"{log.path.name}: {flag}" for log in scanned for flag in log.flags]
     flags += [warning for warning in bound.warnings if not warning.startswith("channel ")]
-    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags))
+    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags), no_lines=no_lines)
 
 
 def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
@@ -154,6 +165,8 @@ def gather_run(
         return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {_words(run, error)}"),))
     measurement = result_of(prepared.measurement, store)
     verdicts = [Verdict("", "log", "warning", flag) for flag in prepared.flags]
+    if prepared.no_lines is not None:
+        verdicts.append(Verdict("", "speed", "warning", f"not read from lines: {prepared.no_lines}"))
     measured = MeasuredRun(run, prepared.bound.recording, measurement, tuple(verdicts))
     if not measured.usable_channels:
         unusable = Verdict("", "run", "bad", "cannot be used: no signal channel is in order")

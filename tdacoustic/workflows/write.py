@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from tdacoustic.campaign import Campaign
-    from tdacoustic.measured.runs import MeasuredRun
     from tdacoustic.reporting.document import Document
     from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
     from tdacoustic.steps import Record
@@ -38,7 +37,7 @@ def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> No
 
     with folder:
         _write_tables(folder, analysis.tables)
-        _write_arrays(folder, analysis.campaign, analysis.runs)
+        _write_arrays(folder, analysis.campaign, analysis)
         _write_report(folder, measured_report(analysis))
         folder.manifest = _manifest(analysis, command)
 
@@ -90,7 +89,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
     with folder:
         _write_fit(folder, result)
         _write_tables(folder, _asked(result))
-        _write_arrays(folder, result.campaign, () if result.analysis is None else result.analysis.runs)
+        _write_arrays(folder, result.campaign, result.analysis)
         _write_report(folder, calibration_report(result))
         folder.manifest = {
             "command": "calibrate",
@@ -121,7 +120,7 @@ def write_run(result: CampaignResult, folder: OutputFolder) -> None:
             _write_tables(folder, _asked(result.calibration))
         if prediction is not None:
             _write_tables(folder, prediction.tables)
-        _write_arrays(folder, result.campaign, analysis.runs, prediction)
+        _write_arrays(folder, result.campaign, analysis, prediction)
         _write_report(folder, run_report(result))
         folder.manifest = {
             **_manifest(analysis, "run"),
@@ -156,12 +155,17 @@ def _asked(result: CampaignCalibration) -> dict[str, pd.DataFrame]:
 
 
 def _write_arrays(
-    folder: OutputFolder, campaign: Campaign, runs: Sequence[MeasuredRun], prediction: FleetPrediction | None = None
+    folder: OutputFolder, campaign: Campaign, analysis: Analysis | None, prediction: FleetPrediction | None = None
 ) -> None:
     from tdacoustic.tables.result_file import write_result_file
 
     model = None if prediction is None else _model_arrays(prediction)
-    write_result_file(folder.staging / ARRAYS, campaign.name, campaign.origin, runs, model)
+    path, what = folder.staging / ARRAYS, (campaign.name, campaign.origin)
+    if analysis is None:
+        write_result_file(path, *what, (), model)
+    else:
+        heard = {} if analysis.tonality is None else analysis.tonality.hearing
+        write_result_file(path, *what, analysis.runs, model, analysis.slips, analysis.orders, heard)
 
 
 def _model_arrays(result: FleetPrediction) -> ModelArrays:

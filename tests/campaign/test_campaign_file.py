@@ -150,6 +150,12 @@ def test_the_whole_contract_is_read(load, tmp_path):
         "analysis.line_prominence_db": AnalysisSettings().line_prominence_db,
         "analysis.speed_tolerance": 0.03,
         "analysis.mains_hz": 50.0,
+        "analysis.order_bandwidth": 0.5,
+        "analysis.highest_order": None,
+        "analysis.vold_kalman": True,
+        "analysis.speed_from": "auto",
+        "analysis.motor_speed_range_rpm": None,
+        "analysis.motor_speed_change_rpm_s": None,
     }
     assert campaign.settings["calibration.free"] == ("masuda.constant_db",)
     assert campaign.settings["calibration.model_sigma_db"] == 4.0

@@ -123,6 +123,37 @@ def test_the_skirts_of_a_strong_line_are_no_lines(frequency, modulation):
     assert line.prominence_db == pytest.approx(80.0, abs=6.0 if frequency < 100.0 else 1.0)
 
 
+def test_a_very_strong_line_is_one_line():
+    """Noise and the skirt beside it are in phase by chance somewhere; that is no second line of the same level."""
+    for seed in range(6):
+        white = np.random.default_rng(seed).standard_normal(N)
+        for number, prominence in enumerate((75.0, 85.0, 95.0, 105.0)):
+            frequency = 900.1 + 317.31 * number + 100.01 * seed
+            found = find_lines(spectrum_of(white + sine(frequency, rms_of_prominence(prominence))))
+            near = [line.frequency_hz for line in found if abs(line.frequency_hz - frequency) < 50.0]
+            assert near == pytest.approx([frequency], abs=0.01), (seed, prominence)
+
+
+def test_a_line_on_the_skirt_of_a_strong_one_is_found():
+    """12 Hz beside a line of 80 dB, whose skirt lies 5 dB over the floor there; it does not borrow its level."""
+    white = np.random.default_rng(3).standard_normal(N)
+    strong = white + sine(1000.4, rms_of_prominence(80.0))
+    for prominence in (20.0, 30.0, 40.0):
+        first, second = find_lines(spectrum_of(strong + sine(1012.77, rms_of_prominence(prominence))))
+        assert first.frequency_hz == pytest.approx(1000.4, abs=1e-3)
+        assert abs(second.frequency_hz - 1012.77) < 3.0 * second.frequency_error_hz < 0.3
+        assert 20.0 * math.log10(second.rms) == pytest.approx(20.0 * math.log10(rms_of_prominence(prominence)), abs=1.5)
+
+
+def test_three_frames_of_noise_have_no_smeared_lines():
+    """Powers of so few frames scatter far beyond a normal number's reach."""
+    alarms = 0
+    for seed in range(60):
+        white = np.random.default_rng(seed).standard_normal(2 * int(RATE))
+        alarms += len(find_lines(spectrum_of(white), 4.0, 2e-4 * (1 + seed % 4)))
+    assert alarms <= 6  # 2 here; 34 before their chances were those of powers
+
+
 @pytest.mark.parametrize("quality", [10, 30, 100])
 def test_a_resonance_gives_at_most_one_line_and_its_width(quality):
     from scipy import signal

@@ -42,7 +42,7 @@ def faded_sines(frequencies, rate, duration):
     return math.sqrt(2.0) * envelope * np.sin(2.0 * np.pi * np.outer(frequencies, t))
 
 
-@pytest.mark.parametrize("rate", [51200.0, 8192.0])
+@pytest.mark.parametrize("rate", [51200.0, 25600.0, 8192.0])
 def test_every_band_is_of_class_1(rate, conformance):
     bands = measured(np.zeros(1000), rate)
     worst = math.inf
@@ -88,7 +88,7 @@ def test_the_bands_are_the_standards(conformance):
 
 
 @pytest.mark.parametrize(
-    ("rate", "highest"), [(44100.0, 16000.0), (48000.0, 16000.0), (8192.0, 3150.0), (1000.0, 400.0)]
+    ("rate", "highest"), [(44100.0, 16000.0), (48000.0, 16000.0), (25600.0, 10000.0), (8192.0, 3150.0), (1000.0, 400.0)]
 )
 def test_no_band_reaches_beyond_what_the_rate_holds(rate, highest):
     assert measured(np.zeros(5000), rate).nominal_hz[-1] == highest
@@ -99,7 +99,7 @@ def test_a_rate_too_low_is_refused():
         ThirdOctaveMeter(40.0, 1, 1000)
 
 
-@pytest.mark.parametrize("rate", [51200.0, 8192.0])
+@pytest.mark.parametrize("rate", [51200.0, 25600.0, 8192.0])
 def test_white_noise_has_the_power_of_the_bands_width(rate):
     seconds = 60
     bands = measured(np.random.default_rng(1).standard_normal(int(seconds * rate)), rate)

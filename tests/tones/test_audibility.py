@@ -244,3 +244,12 @@ def test_a_tone_nobody_hears_is_marked():
         (result,) = rated(tones_in_noise([(1000.0, 10.0)], seconds=9.0, density=density))
         (tone,) = (tone for tone in result.tones if tone.n_spectra == 3)
         assert tone.over_threshold is heard
+
+
+def test_tones_beyond_the_critical_bands_are_not_rated():
+    x = tones_in_noise([(15000.0, 12.0), (16400.0, 12.0)], seconds=9.0, rate=51200.0)
+    (result,) = rated(x, rate=51200.0)
+    assert [round(tone.frequency_hz, -2) for tone in result.tones if tone.n_spectra == 3] == [15000.0]
+    reasons = {round(frequency, -2): reason for frequency, reason in result.excluded}
+    assert reasons[16400.0] == "above 15500 Hz, where the critical bands of hearing end"
+    assert any("15500 Hz" in limit for limit in ISO_TS_20065.limits)

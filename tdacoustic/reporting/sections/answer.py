@@ -12,6 +12,7 @@ from tdacoustic.measured.levels import energy_mean_db
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.sections.contributions import agreement_words
 from tdacoustic.reporting.sections.words import (
     OWNER_SLOTS,
     condition_words,
@@ -75,7 +76,8 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
     if stated or not level:
         return f"{words}: {stated or 'no noise level, so no noise lines and no dominant source'}."
     if runs and all(run.measurement is not None and not run.measurement.steady for run in runs):
-        return f"{words}: {level}; a run-up, so no lines and no dominant source."
+        said = f"{words}: {level}; a run-up, so no lines and no dominant source."
+        return _with(said, agreement_words(analysis, condition))
     verdict = next((v for v in analysis.dominance if v.condition == condition), None)
     held = [source for source in analysis.sources if source.line.condition == condition]
     lines = _strongest_words(held) or (_no_lines_words(analysis, condition) if runs else "")
@@ -85,7 +87,7 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
             parts.append(f"the lines carry {_percent(verdict.line_fraction)} of the sound energy")
         if verdict is not None:
             parts.append(f"dominant source {verdict.dominant}")
-        return "; ".join(part for part in parts if part) + "."
+        return _with(f"{'; '.join(part for part in parts if part)}.", agreement_words(analysis, condition))
     said = f"{words}: {_verdict_words(verdict)}{_fraction_words(analysis, verdict)}."
     against = _against(analysis, verdict, held)
     if against:
@@ -93,7 +95,12 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
     by_hand = _by_hand(analysis, condition, held)
     if by_hand:
         said += f" Set by the engineer: {'; '.join(by_hand)}."
+    said = _with(said, agreement_words(analysis, condition))
     return f"{said} Level {level}; {lines}."
+
+
+def _with(said: str, more: str) -> str:
+    return f"{said} {more}" if more else said
 
 
 def _listed(parts: list[str]) -> str:

@@ -83,6 +83,8 @@ def speed_words(run: MeasuredRun) -> str:
             factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
             of_shaft = f"{profile.shaft} " if profile.shaft else ""
             words.append(f"{of_shaft}{factor * profile.speed.min():.4g} to {factor * profile.speed.max():.4g} {unit}")
+        if profile.source == "lines":
+            words.append("read from lines")
     return ", ".join(words) or "speed not known"
 
 

@@ -1,0 +1,380 @@
+"""How many decibels come from where: contributions of components to each microphone, and how coherent they are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.attribution import CampaignContributions, ContributionState
+from tdacoustic.attribution.contribution_spans import NamedSpan
+from tdacoustic.contributions import GroupPart, SpanContributions
+from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.sections.coherence import coherence, state_words
+from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, joined, pretty_signs, slug
+from tdacoustic.results import Analysis
+from tdacoustic.tables.contributions import power_db
+
+__all__ = ["agreement_words", "contributions"]
+
+Row = tuple[ContributionState, NamedSpan, SpanContributions]
+
+IN_SIGHT: Final = 3
+"""Runs whose figures stand in sight; those of more are folded away."""
+NO_LOWER_DB: Final = 15.0
+"""Length of a bar without a lower end."""
+MOST: Final = 0.5
+SYMBOLS: Final = {"ok": "circle", "flagged": "x", "refused": "triangle", "below": "triangle"}
+WORDS: Final = {"ok": "", "flagged": ", flagged", "bound": ", at most"}
+
+METHOD = (
+    "A contribution is the power at the microphone that moves with a component's sensors, by transfer paths of all "
+    "runs together; cross-talk between the sensors is taken off as far as the runs differ enough in the mix of their "
+    "sources to tell it. Known: cross-talk leaves less than 3 dB open. Flagged: more, so the level is what the sensors "
+    "explain, cross-talk included, and its range is that of the readings, no confidence interval. Refused: next to "
+    "nothing of it is its own; only the upper bound says something. Intervals are of 95 %. What is loud and has no "
+    "sensor is found under no component: it is what no sensor explains, or hides in those whose sensors feel it too."
+)
+
+
+def contributions(analysis: Analysis) -> Section | None:
+    """Return the section on contributions and coherence; None where nothing could be held against each other."""
+    found = analysis.contributions
+    if found is None:
+        return None
+    rows = list(found.rows())
+    receivers = list(dict.fromkeys(parts.receiver for _, _, parts in rows))
+    first, others = receivers[0], receivers[1:]
+    blocks: list[Block] = [
+        *_answer(analysis, found, rows, first),
+        *_of_receiver(analysis, found, rows, first, figures=True),
+    ]
+    for receiver in others:
+        blocks.append(Details(f"The same at {receiver}", _of_receiver(analysis, found, rows, receiver, figures=False)))
+    blocks += [Paragraph(METHOD)]
+    if found.notes:
+        blocks.append(Sentences([f"Left out: {note}." for note in found.notes]))
+    blocks.append(coherence(analysis, found, first))
+    return Section("contributions", "How many decibels come from where", blocks)
+
+
+def _of_receiver(
+    analysis: Analysis, found: CampaignContributions, rows: Sequence[Row], receiver: str, figures: bool
+) -> list[Block]:
+    """Tables and figures of one microphone; those over frequency where they are asked for."""
+    held = [row for row in rows if row[2].receiver == receiver]
+    origin = analysis.campaign.origin
+    over_speed = [FigureBlock(figure, origin) for figure in _over_speed(found, held, receiver)]
+    drawn = [FigureBlock(figure, origin) for figure in _over_frequency(found, held, receiver)] if figures else []
+    blocks: list[Block] = [*over_speed]
+    if len(drawn) <= IN_SIGHT:
+        blocks += drawn
+    else:
+        blocks.append(Details(f"Contributions over frequency, {len(drawn)} operating states", drawn))
+    whole = [row for row in held if row[1].kind in ("total", "tones", "broadband")]
+    single = [row for row in held if row[1].kind in ("order", "tone")]
+    blocks.append(_table(analysis, found, whole, slug("contributions", receiver), f"Contributions at {receiver}"))
+    if single:
+        title = f"Contributions at {receiver}, tone by tone"
+        table = _table(analysis, found, single, slug("contributions-of-tones", receiver), title)
+        blocks.append(Details(f"Tone by tone and order by order, {len(single)} rows", [table]))
+    return [*blocks, *_reasons(held, receiver)]
+
+
+# ---------------------------------------------------------------- words
+
+
+def _db(mean_square: float | None) -> str:
+    level = power_db(mean_square)
+    return "no power" if level is None else f"{level:.1f} dB"
+
+
+def _range(part: GroupPart) -> str:
+    low, high = power_db(part.low), power_db(part.high)
+    if high is None:
+        return ""
+    return f"at most {high:.1f}" if low is None else f"{low:.1f} to {high:.1f}"
+
+
+def _part_words(name: str, part: GroupPart) -> str:
+    if part.verdict in ("refused", "below"):
+        return f"{name} {'refused, ' if part.verdict == 'refused' else ''}at most {_db(part.high)}"
+    return f"{name} {_db(part.mean_square)} ({'flagged, ' if part.verdict == 'flagged' else ''}{_range(part)})"
+
+
+def _answer(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row], receiver: str) -> list[Block]:
+    """A sentence a run, at one microphone."""
+    sentences = []
+    runs = list(dict.fromkeys(state.run for state in found.states))
+    for run in runs:
+        held = [row for row in rows if row[0].run == run and row[2].receiver == receiver]
+        if held:
+            sentences.append(pretty_signs(_sentence(held, several=len(runs) > len(analysis.campaign.conditions()))))
+    words = f"At {receiver}, by the paths of {len(found.states)} operating states together"
+    if len(found.states) == 1:
+        words = f"At {receiver}, from a single operating state, which cannot tell cross-talk from a source"
+    return [Paragraph(f"{words}:"), Sentences(sentences)]
+
+
+def _sentence(held: Sequence[Row], several: bool) -> str:
+    state = held[0][0]
+    what = f"Condition {state.condition}" + (f", run {state.run}" if several else "")
+    if not state.steady:
+        return f"{what}, {_run_up_words(held)}"
+    speed = f" ({state_words(state)})" if state_words(state) else ""
+    by_kind = {span.kind: parts for _, span, parts in held if span.kind in ("total", "tones", "broadband")}
+    total, tones = by_kind["total"], by_kind.get("tones")
+    said = f"{what}{speed}: "
+    if tones is not None:
+        told = joined([_part_words(name, part) for name, part in tones.groups.items()])
+        said += f"of the tones' {_db(tones.total)}: {told}; {_unexplained(tones)}. Of all {_db(total.total)} "
+    else:
+        told = joined([_part_words(name, part) for name, part in total.groups.items()])
+        said += f"of {_db(total.total)}: {told}; "
+    return said + f"{_unexplained(total)}."
+
+
+def _unexplained(parts: SpanContributions) -> str:
+    share = 100.0 * parts.residual / parts.total if parts.total > 0.0 else 0.0
+    return f"no sensor explains {_db(parts.residual)}" + (f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else "")
+
+
+def _run_up_words(held: Sequence[Row]) -> str:
+    """Of a run-up: how often each component's part of the whole is known, and from where to where it goes."""
+    rows = [(state, parts) for state, span, parts in held if span.kind == "total"]
+    speeds = [words.removeprefix("motor ") for state, _ in rows if (words := state_words(state))]
+    said = []
+    for name in rows[0][1].groups:
+        levels = [power_db(p.groups[name].mean_square) for _, p in rows if p.groups[name].verdict == "ok"]
+        known = [level for level in levels if level is not None]
+        if known:
+            said.append(f"{name} {min(known):.1f} to {max(known):.1f} dB, known at {len(known)} of {len(rows)} speeds")
+    known_any = bool(said)
+    said = said or [f"no component's part is known at any of {len(rows)} speeds"]
+    most = sum(p.residual > MOST * p.total for _, p in rows)
+    end = f"; most of the sound is explained by no sensor at {most} of them" if most else ""
+    ends = f" from {speeds[0].split()[0]} to {speeds[-1]}" if speeds else ""
+    return f"a run-up{ends}: {'of the whole sound ' if known_any else ''}{joined(said)}{end}."
+
+
+def agreement_words(analysis: Analysis, condition: str) -> str:
+    """Return whether the kinds of evidence on a condition agree, as one sentence; empty where there is nothing to say.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    condition : str
+    """
+    found = analysis.agreements.get(condition)
+    if found is None:
+        return ""
+    quiet = "contribution" in found.agreement.silent
+    doubt = f"contributions: {found.contribution_words}" if quiet and found.contribution_words else ""
+    if found.agreement.word == "silent":
+        return f"{doubt[0].upper()}{doubt[1:]}." if doubt else ""
+    by_source: dict[str, list[str]] = {}
+    for kind, (source, _) in found.agreement.leads.items():
+        by_source.setdefault(source, []).append(f"{kind}s")
+    said = [f"{joined(kinds)} say {source}" for source, kinds in by_source.items()]
+    silent = [f"{kind}s" for kind in found.agreement.silent if kind != "contribution"]
+    said += [f"{joined(silent)} name no source"] if silent else []
+    said += [doubt] if doubt else []
+    opening = {"agree": "The kinds of evidence agree", "disagree": "The kinds of evidence disagree"}
+    return f"{opening.get(found.agreement.word, 'One kind of evidence alone')}: {'; '.join(said)}."
+
+
+# ---------------------------------------------------------------- figures
+
+
+def _slot(found: CampaignContributions, name: str) -> int:
+    others = [component for component in found.components if component not in OWNER_SLOTS]
+    return OWNER_SLOTS[name] if name in OWNER_SLOTS else (OWNER_SLOT_OTHER, 4, 5, 6)[others.index(name) % 4]
+
+
+def _elements(
+    found: CampaignContributions, x: Sequence[float], rows: Sequence[SpanContributions], logarithmic: bool
+) -> list[Element]:
+    """Parts of some spans: what was measured, what no sensor explains, and each component by its verdict."""
+    at = np.array(x)
+    total = np.array([power_db(parts.total) for parts in rows], dtype=np.float64)
+    rest = np.array([power_db(parts.residual) for parts in rows], dtype=np.float64)
+    style = {"points": True} if len(x) <= 12 else {}
+    elements: list[Element] = [
+        Line(at, total, "measured", color=7, **style),  # type: ignore[arg-type]
+        Line(at, rest, "explained by no sensor", style="dashed", color=3, **style),  # type: ignore[arg-type]
+    ]
+    names = found.components
+    span = float(at.max() - at.min()) if at.size > 1 else 1.0
+    for number, name in enumerate(names):
+        step = number - 0.5 * (len(names) - 1)
+        place = at * 1.025**step if logarithmic else at + 0.012 * span * step
+        elements += _part_elements(name, place, [parts.groups[name] for parts in rows], _slot(found, name))
+    return elements
+
+
+def _part_elements(name: str, x: np.ndarray, parts: Sequence[GroupPart], slot: int) -> list[Element]:
+    found: list[Element] = []
+    bars_x: list[float] = []
+    bars_y: list[float] = []
+    groups: dict[str, list[tuple[float, float, str]]] = {}
+    for place, part in zip(x, parts, strict=True):
+        bound = part.verdict in ("refused", "below")
+        level = power_db(part.high if bound else part.mean_square)
+        if level is None:
+            continue
+        words = f"{name}: {_part_words('', part).strip()}"
+        groups.setdefault("bound" if bound else part.verdict, []).append((float(place), level, words))
+        high, low = power_db(part.high), power_db(part.low)
+        if not bound and high is not None:
+            bars_x += [float(place)] * 3
+            bars_y += [level - NO_LOWER_DB if low is None else low, high, np.nan]
+    if bars_x:
+        found.append(Line(np.array(bars_x), np.array(bars_y), f"{name}: range", color=slot, opacity=0.5, group="range"))
+    for kind, points in groups.items():
+        found.append(
+            Markers(
+                np.array([p[0] for p in points]),
+                np.array([p[1] for p in points]),
+                f"{name}{WORDS[kind]}",
+                texts=tuple(p[2] for p in points),
+                symbol=SYMBOLS.get(kind, "triangle"),  # type: ignore[arg-type]
+                color=slot,
+            )
+        )
+    return found
+
+
+def _limits(elements: Iterable[Element]) -> tuple[float, float]:
+    """From a little below the lowest point to a little above the highest; bars may run out of it."""
+    levels = [e.y for e in elements if isinstance(e, Markers)]
+    levels += [e.y for e in elements if isinstance(e, Line) and not e.name.endswith("range")]
+    values = np.concatenate(levels)
+    values = values[np.isfinite(values)]
+    return (float(values.min()) - 4.0, float(values.max()) + 3.0) if values.size else (0.0, 1.0)
+
+
+DRAWN = (
+    "A dot is known, a cross flagged, a triangle an upper bound of what is refused or does not stand above its "
+    "scatter; the bars are the ranges of the table, and those without a lower end are drawn 15 dB down."
+)
+
+
+def _over_frequency(found: CampaignContributions, held: Sequence[Row], receiver: str) -> list[Figure]:
+    """One figure an operating state: parts in third octaves."""
+    figures = []
+    for state in found.states:
+        rows = [(span, parts) for s, span, parts in held if s.name == state.name and span.kind == "band"]
+        if len(rows) < 2:
+            continue
+        centres = [float(np.sqrt(parts.band_hz[0] * parts.band_hz[1])) for _, parts in rows]
+        elements = _elements(found, centres, [parts for _, parts in rows], logarithmic=True)
+        speed = f", {state_words(state)}" if state_words(state) else ""
+        figures.append(
+            Figure(
+                slug("contributions", receiver, state.name, state.run),
+                f"Contributions at {receiver}, run {state.run}{speed}",
+                f"In third octaves. {DRAWN}",
+                Axis("Frequency", "Hz", "log"),
+                Axis("Sound pressure level", "dB", reference="20 µPa", limits=_limits(elements)),
+                elements,
+                height=360,
+            )
+        )
+    return figures
+
+
+def _over_speed(found: CampaignContributions, held: Sequence[Row], receiver: str) -> list[Figure]:
+    """Parts of the tones, and of the whole, over speed."""
+    figures = []
+    speeds = {state.name: state.train_speed_km_h for state in found.states}
+    label, unit = "Train speed", "km/h"
+    if any(speed is None for speed in speeds.values()):
+        speeds = {state.name: None if state.motor_hz is None else 60.0 * state.motor_hz for state in found.states}
+        label, unit = "Motor speed", "rpm"
+    for kind, what in (("tones", "the tones"), ("total", "the whole sound")):
+        rows = [(speed, p) for s, span, p in held if span.kind == kind and (speed := speeds[s.name]) is not None]
+        rows.sort(key=lambda row: row[0])
+        if len({speed for speed, _ in rows}) < 2:
+            continue
+        elements = _elements(found, [speed for speed, _ in rows], [parts for _, parts in rows], logarithmic=False)
+        figures.append(
+            Figure(
+                slug(f"contributions-over-speed-{kind}", receiver),
+                f"Contributions to {what} over speed at {receiver}",
+                DRAWN,
+                Axis(label, unit),
+                Axis("Sound pressure level", "dB", reference="20 µPa", limits=_limits(elements)),
+                elements,
+                height=340,
+            )
+        )
+    return figures
+
+
+# ---------------------------------------------------------------- tables
+
+
+def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row], name: str, title: str) -> Table:
+    columns = [
+        Column("run", "Run"),
+        Column("speed", "Speed", align="right"),
+        Column("span", "Sound"),
+        Column("total_db", "Measured", "dB", 1, "number"),
+        Column("residual_db", "No sensor", "dB", 1, "number"),
+        *(Column(f"{slug(component)}_db", component.capitalize(), "dB") for component in found.components),
+    ]
+    cells = [
+        [
+            state.run,
+            state_words(state),
+            _span_words(span),
+            power_db(parts.total),
+            power_db(parts.residual),
+            *(_cell(parts.groups[component]) for component in found.components),
+        ]
+        for state, span, parts in rows
+    ]
+    return Table(name, f"{title} (levels re 20 µPa, 95 %)", columns, cells, origin=analysis.campaign.origin)
+
+
+def _cell(part: GroupPart) -> str:
+    """A part in the table: its level and range, or its bound, and its verdict where it is not known."""
+    low, high = power_db(part.low), power_db(part.high)
+    bound = "" if high is None else f"\N{LESS-THAN OR EQUAL TO} {high:.1f}"
+    if part.verdict in ("refused", "below"):
+        return f"refused, {bound}" if part.verdict == "refused" else bound
+    reach = bound if low is None or high is None else f"{low:.1f} to {high:.1f}"
+    level = power_db(part.mean_square)
+    said = "" if level is None else f"{level:.1f}"
+    return f"{said} flagged, {reach}" if part.verdict == "flagged" else f"{said} ({reach})"
+
+
+def _span_words(span: NamedSpan) -> str:
+    return {"total": "all", "tones": "tones", "broadband": "broadband"}.get(span.kind, span.span.name)
+
+
+def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
+    """Why parts are flagged or refused, each reason once, with where."""
+    where: dict[tuple[str, str, str], list[str]] = {}
+    for state, span, parts in held:
+        for name, part in parts.groups.items():
+            if part.verdict in ("flagged", "refused") and span.kind != "band":
+                reason = part.reason.split(":")[0]
+                where.setdefault((name, part.verdict, reason), []).append(f"run {state.run} {_span_words(span)}")
+    if not where:
+        return []
+    columns = (
+        Column("part", "Part"),
+        Column("verdict", "Verdict", kind="verdict"),
+        Column("reason", "Why"),
+        Column("count", "Times", "", 0, "number"),
+        Column("where", "Where"),
+    )
+    rows = [
+        (name, verdict, reason, len(places), f"{', '.join(places[:4])}{', ...' if len(places) > 4 else ''}")
+        for (name, verdict, reason), places in where.items()
+    ]
+    table = Table(slug("contribution-reasons", receiver), "Why parts are flagged or refused", columns, rows)
+    return [Details(f"Why parts are flagged or refused, {len(rows)} reasons", [table])]

@@ -1,0 +1,318 @@
+"""Orders: which lead over the speed, what is fixed in Hz, what repeats every turn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from tdacoustic.measured.order_results import Average, ChannelOrders, RunOrders
+from tdacoustic.measured.runs import MeasuredRun, receivers
+from tdacoustic.orders import FixedFrequency
+from tdacoustic.recording import Channel
+from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.figure import Figure
+from tdacoustic.reporting.sections.order_figures import (
+    average_figure,
+    cut_figure,
+    frequency_figure,
+    leading_levels,
+    order_figure,
+    order_words,
+    shaft_words,
+    sure_resonances,
+)
+from tdacoustic.reporting.sections.words import joined, pretty_signs, slug, speed_words
+from tdacoustic.results import Analysis
+from tdacoustic.units import level_db
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["orders"]
+
+SHOWN: Final = 2
+"""Receivers whose maps are open; those of other channels are folded away."""
+MOST_FOLDED: Final = 10
+"""Further channels of a run that have figures."""
+SAME_LINE: Final = 0.012
+"""Relative distance within which a line that is fixed in Hz is taken for a named one: a carrier is a percent off."""
+
+
+def orders(analysis: Analysis) -> Section | None:
+    """Return the section on orders, or None where no run has any."""
+    held = [(run, analysis.orders[run.name]) for run in analysis.runs if run.name in analysis.orders]
+    if not held:
+        return None
+    microphones = receivers(analysis.runs)
+    blocks: list[Block] = []
+    for run, found in held:
+        if not found.steady:
+            blocks.append(_run_up(analysis, run, found, microphones))
+    steady = [(run, found) for run, found in held if found.steady]
+    if steady:
+        blocks.append(_steady(analysis, steady, microphones))
+    blocks += _sidebands(analysis)
+    return Section("orders", "Orders", [*blocks, Paragraph(_method(held))])
+
+
+def _method(held: Sequence[tuple[MeasuredRun, RunOrders]]) -> str:
+    shafts = joined(list(dict.fromkeys(shaft_words(found) for _, found in held)))
+    asked = held[0][1].requested_bandwidth
+    named = "and named by the fleet" if any(_named(found) for _, found in held) else "and nobody names their owners"
+    return (
+        f"Signals are resampled to even steps of the angle of the {shafts}; orders are per turn of it, {named}. "
+        f"Cuts are {asked:.3g} orders wide; each level has its floor and standard error, and orders.csv says why one "
+        "is missing or doubtful."
+    )
+
+
+def _named(found: RunOrders) -> bool:
+    return any(order.kind not in ("asked", "found") for order in found.orders)
+
+
+def _channels(run: MeasuredRun, found: RunOrders) -> Iterator[tuple[Channel, ChannelOrders]]:
+    assert run.recording is not None
+    for held in found.channels:
+        yield run.recording[held.channel], held
+
+
+# ------------------------------------------------------------ run-ups
+
+
+def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones: Sequence[str]) -> Section:
+    channels = sorted(_channels(run, found), key=lambda item: item[0].name not in microphones)
+    sentences = [
+        sentence
+        for channel, held in channels
+        if channel.name in microphones or not any(c.name in microphones for c, _ in channels)
+        for sentence in _leaders(found, channel, held)
+    ]
+    sentences += [*_fixed_sentences(found, [held for _, held in channels])]
+    sentences += [f"The angle of the {shaft_words(found)}: {note}." for note in found.notes if note not in _told(run)]
+    sentences += list(dict.fromkeys(note[:1].upper() + note[1:] + "." for _, held in channels for note in held.notes))
+    blocks: list[Block] = [Sentences([pretty_signs(sentence) for sentence in sentences])] if sentences else []
+    open_ones = [name for name in microphones if any(c.name == name for c, _ in channels)][:SHOWN]
+    if not open_ones and channels:
+        open_ones = [channels[0][0].name]
+    origin = analysis.campaign.origin
+    folded = 0
+    for channel, held in channels:
+        figures = [frequency_figure(run.name, found, channel, held), cut_figure(run.name, found, channel, held)]
+        if channel.name in open_ones:
+            figures.insert(1, order_figure(run.name, found, channel, held))
+        shown = [FigureBlock(figure, origin) for figure in figures if isinstance(figure, Figure)]
+        if channel.name in open_ones:
+            blocks += shown
+        elif folded < MOST_FOLDED and shown:
+            folded += 1
+            blocks.append(Details(f"{channel.name}: map and orders over speed", shown))
+    left = len(channels) - len(open_ones) - folded
+    if left > 0:
+        blocks.append(Paragraph(f"Maps and orders of {left} more channels are in result.h5 and orders.csv."))
+    blocks += _fixed_table(analysis, run)
+    return Section(slug("orders-of", run.name), f"Run {run.name}: {speed_words(run)}", blocks)
+
+
+def _told(run: MeasuredRun) -> set[str]:
+    """What other sections say of the run's speed."""
+    assert run.measurement is not None
+    return {note for profile in run.measurement.speed.profiles for note in profile.notes}
+
+
+def _leaders(found: RunOrders, channel: Channel, held: ChannelOrders) -> list[str]:
+    """Which order is the strongest over which speeds."""
+    leading = leading_levels(held)
+    if not leading:
+        return [f"{channel.name}: no order stands 6 dB over its floor anywhere."]
+    size = max(item.speeds_hz.size for item in leading)
+    whole = [item for item in leading if item.speeds_hz.size == size]  # of the reference shaft: the same classes
+    power = np.array([np.where(item.usable & ~item.disturbed, item.mean_square, 0.0) for item in whole])
+    first = np.where(power.max(axis=0) > 0.0, np.argmax(power, axis=0), -1)
+    rpm = 60.0 * whole[0].speeds_hz
+    spans: list[tuple[int, int, int]] = []
+    for index, leader in enumerate(first.tolist()):
+        if spans and spans[-1][0] == leader:
+            spans[-1] = (leader, spans[-1][1], index)
+        else:
+            spans.append((leader, index, index))
+    sentences = []
+    counts = {leader: int(np.sum(first == leader)) for leader in set(first.tolist()) if leader >= 0}
+    for leader in sorted(counts, key=lambda item: -counts[item])[:2]:
+        item, own = whole[leader], [(a, b) for who, a, b in spans if who == leader]
+        loudest = int(np.argmax(np.where(first == leader, power[leader], 0.0)))
+        level = level_db(math.sqrt(power[leader][loudest]), channel.quantity)
+        at = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4]) + (" and elsewhere" if len(own) > 4 else "")
+        sentences.append(
+            f"{channel.name}: {order_words(item.order.name, item.order.order)} is the strongest order {at}, with up to "
+            f"{level:.1f} dB at {rpm[loudest]:.0f} rpm."
+        )
+    return sentences
+
+
+def _range_words(low: float, high: float) -> str:
+    return f"at {low:.0f} rpm" if low == high else f"from {low:.0f} to {high:.0f} rpm"
+
+
+def _fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list[str]:
+    """Resonances that are passed, and lines that stay in Hz, each with the channels that show it."""
+    groups: list[tuple[FixedFrequency, list[str]]] = []
+    for held in channels:
+        for item in held.fixed:
+            if item.kind == "resonance" and item not in sure_resonances(held):
+                continue
+            for other, names in groups:
+                if other.kind == item.kind and abs(other.frequency_hz / item.frequency_hz - 1.0) < SAME_LINE:
+                    names.append(held.channel)
+                    break
+            else:
+                groups.append((item, [held.channel]))
+    sentences = []
+    for item, names in sorted(groups, key=lambda group: group[0].frequency_hz):
+        if item.kind == "resonance":
+            passing = [
+                f"{order_words(order.name, order.order)} at {60.0 * item.frequency_hz / order.order:.0f} rpm"
+                for order in found.orders
+                if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
+            ]
+            width = f", {item.loss_factor * item.frequency_hz:.0f} Hz wide at most" if item.loss_factor > 0 else ""
+            sentences.append(
+                f"A resonance at {item.frequency_hz:.0f} Hz{width} raises what passes it by {item.rise_db:.0f} dB in "
+                f"{joined(names)}: {joined(passing[:4])}{' and others' if len(passing) > 4 else ''}."
+            )
+        else:
+            own = _curve_name(found, item.frequency_hz)
+            sentences.append(
+                f"A line at {item.frequency_hz:.1f} Hz{f' ({own})' if own else ''} stays where it is while the speed "
+                f"changes, in {joined(names)}: it is no order of the shaft."
+            )
+    return sentences
+
+
+def _curve_name(found: RunOrders, frequency_hz: float) -> str:
+    for curve in found.curves:
+        known = curve.frequencies_hz[np.isfinite(curve.frequencies_hz)]
+        if known.size and np.ptp(known) < 1e-6 * known[0] and abs(known[0] / frequency_hz - 1.0) < SAME_LINE:
+            return curve.name
+    return ""
+
+
+def _fixed_table(analysis: Analysis, run: MeasuredRun) -> list[Block]:
+    table = analysis.tables["resonances"]
+    held = table[table["run"] == run.name]
+    if not len(held):
+        return []
+    columns = (
+        Column("channel", "Channel"),
+        Column("kind", "What"),
+        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
+        Column("width_hz", "Width", "Hz", 1, "number"),
+        Column("rise_db", "Over its surroundings", "dB", 1, "number"),
+        Column("confidence", "Confidence", "", 2, "number"),
+        Column("orders", "Orders that pass"),
+        Column("detail", "By what"),
+    )
+    name = slug("resonances", run.name)
+    caption = (
+        f"What stays at its frequency while the speed changes, run {run.name}. A resonance raises orders that pass "
+        "it; a line is there by itself at each class of speed. The width is an upper bound: the sweep broadens it."
+    )
+    return [Table(name, caption, columns, _cells(held, columns))]
+
+
+# ------------------------------------------------------------ steady runs
+
+
+def _steady(analysis: Analysis, held: Sequence[tuple[MeasuredRun, RunOrders]], microphones: Sequence[str]) -> Section:
+    rows: list[tuple[str | float | None, ...]] = []
+    best: tuple[float, MeasuredRun, Channel, Average] | None = None
+    shares: list[tuple[float, str, str]] = []
+    for run, found in held:
+        for channel, orders_of in _channels(run, found):
+            for average in orders_of.averages:
+                lines = np.abs(average.amplitudes[1:]) ** 2
+                share = float(lines.sum()) / (float(lines.sum()) + average.residual_mean_square)
+                rows.append(
+                    (
+                        run.name,
+                        channel.name,
+                        average.shaft,
+                        average.periods,
+                        level_db(math.sqrt(float(lines.sum())), channel.quantity),
+                        level_db(math.sqrt(average.residual_mean_square), channel.quantity),
+                        100.0 * share,
+                    )
+                )
+                if average.ratio == 1.0:
+                    if channel.name in microphones:
+                        shares.append((share, channel.name, run.name))
+                    elif best is None or share > best[0]:
+                        best = (share, run, channel, average)
+    blocks: list[Block] = []
+    if shares:
+        low, high = min(shares), max(shares)
+        words = (
+            f"Of the sound energy {100.0 * low[0]:.0f} % ({low[1]}, run {low[2]}) to {100.0 * high[0]:.0f} % "
+            f"({high[1]}, run {high[2]}) repeats with every turn of the {shaft_words(held[0][1])}"
+            if len(shares) > 1
+            else f"Of the sound energy at {low[1]} {100.0 * low[0]:.0f} % repeats with every turn of the "
+            f"{shaft_words(held[0][1])}"
+        )
+        blocks.append(Paragraph(f"{words}: gears and what turns. The rest is what does not follow the shaft."))
+    columns = (
+        Column("run", "Run"),
+        Column("channel", "Channel"),
+        Column("shaft", "Shaft"),
+        Column("turns", "Turns", "", 0, "number"),
+        Column("synchronous_db", "Repeats every turn", "dB", 1, "number"),
+        Column("residual_db", "The rest", "dB", 1, "number"),
+        Column("share", "Share that repeats", "%", 0, "number"),
+    )
+    caption = (
+        "Time-synchronous averages of the runs of constant speed. The average of N turns keeps 1/N of the energy of "
+        "what does not repeat."
+    )
+    if rows:
+        table = Table("synchronous", caption, columns, rows)
+        shown = [FigureBlock(average_figure(best[1].name, *best[2:]), analysis.campaign.origin)] if best else []
+        blocks.append(Details(f"{len(rows)} synchronous averages", [table, *shown]))
+    return Section("synchronous-averages", "What repeats with every turn, at constant speed", blocks)
+
+
+# ------------------------------------------------------------ sidebands
+
+
+def _sidebands(analysis: Analysis) -> list[Block]:
+    table = analysis.tables["sidebands"]
+    if not len(table):
+        return []
+    held = table[table["pairs"] > 0]
+    carriers = joined(list(dict.fromkeys(table["carrier"]))[:6])
+    if not len(held):
+        return [Paragraph(f"No pair of sidebands of {carriers} stands 6 dB over the floor on both sides.")]
+    columns = (
+        Column("run", "Run"),
+        Column("channel", "Channel"),
+        Column("carrier", "Carrier"),
+        Column("spacing", "Spaced by"),
+        Column("speed_rpm", "Speed", "rpm", 0, "number"),
+        Column("pairs", "Pairs", "", 0, "number"),
+        Column("sidebands_db", "Sidebands over carrier", "dB", 1, "number"),
+        Column("amplitude_depth", "Amplitude modulation", "", 3, "number"),
+        Column("phase_depth_rad", "Phase modulation", "rad", 3, "number"),
+        Column("reason", "Remark"),
+    )
+    spacings = joined(list(dict.fromkeys(held["spacing"])))
+    words = f"Sidebands spaced by the {spacings} stand out beside {joined(list(dict.fromkeys(held['carrier']))[:6])}."
+    rows = _cells(held, columns)
+    name = "Pairs of sidebands that stand 6 dB over the floor on both sides"
+    return [Paragraph(words), Details(f"{len(rows)} families of sidebands", [Table("sidebands", name, columns, rows)])]
+
+
+def _cells(held: pd.DataFrame, columns: Sequence[Column]) -> list[list[Any]]:
+    return [
+        [row[column.key] if isinstance(row[column.key], str) or column.kind == "number" else "" for column in columns]
+        for row in held.to_dict("records")
+    ]

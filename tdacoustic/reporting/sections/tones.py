@@ -1,0 +1,359 @@
+"""Is it tonal: one sentence a condition and receiver, where the tones lie, whose they are, what the methods know."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from tdacoustic.measured.runs import MeasuredRun, receivers
+from tdacoustic.measured.tonality import RunTonality, RunTone, Tonality
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.sections.tones_figures import audibility_figure, criterion_figure, run_up_figures
+from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, tested_runs
+from tdacoustic.results import Analysis
+
+__all__ = ["tones"]
+
+ISO, DIN, ECMA = "ISO/TS 20065:2022", "DIN 45681:2005-03", "ECMA-418-1:2024"
+"""Methods, as the tables have them."""
+NAMED_TONES = 3
+MORE_THAN_ALL = 0.99
+
+
+def tones(analysis: Analysis) -> Section | None:
+    """Return the section on tones, or None where no microphone was there to be rated."""
+    found = analysis.tonality
+    if found is None or not found.ratings:
+        return None
+    microphones = receivers(analysis.runs) or tuple(dict.fromkeys(rating.channel for rating in found.ratings))
+    blocks: list[Block] = [Paragraph(_answer(analysis, found, microphones))]
+    said = list(_sentences(analysis, found, microphones))
+    if said:
+        blocks.append(Sentences(said))
+    blocks += _figures(analysis, found, microphones)
+    blocks.append(_table(analysis, found))
+    doubts = _notes(found.ratings)
+    if doubts:
+        blocks.append(Details("What to know about these ratings", [Sentences(doubts)]))
+    blocks += _more_tables(analysis, found)
+    limits = [f"{method}: {limit}" for method, of in found.limits for limit in of]
+    if limits:
+        blocks.append(Details("What the methods cannot do, and how far they are known here", [Sentences(limits)]))
+    return Section("tones", "Is it tonal?", blocks)
+
+
+# ---------------------------------------------------------------- the answer
+
+
+def _verdict(rating: RunTonality | None) -> str:
+    """``tonal``, ``not tonal``, ``open`` within the uncertainty; ``run-up``, which has none; or ``not rated``."""
+    if rating is None or rating.mean_audibility_db is None:
+        return "not rated"
+    if rating.run_up:
+        return "run-up"
+    mean, around = rating.mean_audibility_db, rating.uncertainty_db or 0.0
+    if mean - around > 0.0:
+        return "tonal"
+    return "open" if mean + around > 0.0 else "not tonal"
+
+
+def _rated_runs(analysis: Analysis, condition: str) -> list[MeasuredRun]:
+    return [run for run in tested_runs(analysis) if run.run.condition == condition]
+
+
+def _answer(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> str:
+    """The whole campaign in two sentences."""
+    tonal: dict[str, list[str]] = {}
+    prominent: list[str] = []
+    for condition in analysis.campaign.conditions():
+        runs = _rated_runs(analysis, condition)
+        verdicts = {_verdict(found.rating(run.name, name, ISO)) for run in runs for name in microphones}
+        for word in ("tonal", "open", "not tonal", "run-up", "not rated"):
+            if word in verdicts:
+                tonal.setdefault(word, []).append(condition)
+                break
+        if any(tone.prominent and tone.condition == condition and tone.channel in microphones for tone in found.tones):
+            prominent.append(condition)
+    words = {
+        "tonal": "tonal at a receiver at least",
+        "open": "open, within the uncertainty of the audibility",
+        "not tonal": "not tonal",
+        "run-up": "rated spectrum by spectrum, for the speed changes, and without a verdict",
+        "not rated": "not rated",
+    }
+    parts = [f"{_conditions(tonal[word])}: {words[word]}" for word in words if word in tonal]
+    answer = f"By {ISO} (tonal: a mean audibility above 0 dB): {'; '.join(parts)}."
+    if prominent:
+        return f"{answer} By {ECMA} a tone is prominent in {_conditions(prominent)}."
+    if not any(tone.prominent is not None for tone in found.tones):
+        return answer
+    return f"{answer} No tone is prominent by {ECMA}."
+
+
+def _conditions(names: Sequence[str]) -> str:
+    return f"condition{'s' if len(names) > 1 else ''} {joined(list(names))}"
+
+
+def _sentences(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> Iterator[str]:
+    for condition in analysis.campaign.conditions():
+        runs = _rated_runs(analysis, condition)
+        for name in microphones:
+            rated = [(run, rating) for run in runs if (rating := found.rating(run.name, name, ISO)) is not None]
+            if rated:
+                words = f"{condition_words(analysis, condition)}, {name}"
+                yield pretty_signs(f"{words}: {_of_receiver(found, name, rated)}")
+
+
+def _of_receiver(found: Tonality, name: str, rated: Sequence[tuple[MeasuredRun, RunTonality]]) -> str:
+    """What the runs of a condition say of one receiver."""
+    known = [(run, rating) for run, rating in rated if rating.mean_audibility_db is not None]
+    if not known:
+        notes = [note.removeprefix("not rated, ") for _, rating in rated for note in rating.notes]
+        return f"not rated, {'; '.join(dict.fromkeys(notes))}."
+    run, rating = max(known, key=lambda pair: pair[1].mean_audibility_db or 0.0)
+    if rating.run_up:
+        return _of_run_up(found, run, name)
+    verdicts = [_verdict(one) for _, one in known]
+    verdict = {"open": "open, within its uncertainty"}.get(_verdict(rating), _verdict(rating))
+    of_runs = f" in {verdicts.count('tonal')} of {len(known)} runs" if len(known) > 1 and verdict == "tonal" else ""
+    highest = ", run " + run.name + " highest" if len(known) > 1 else ""
+    mean = f"mean audibility {rating.mean_audibility_db:.1f} \N{PLUS-MINUS SIGN} {rating.uncertainty_db or 0.0:.1f} dB"
+    said = [f"{verdict}{of_runs}, {mean}{highest} (ISO/TS 20065)"]
+    strongest = _most_audible(found.of(run.name, name, ISO))
+    if strongest:
+        said.append(f"most audible {joined([_tone_words(tone) for tone in strongest])}")
+    din = found.rating(run.name, name, DIN)
+    if din is not None and din.adjustment_db is not None:
+        said.append(f"tone adjustment {din.adjustment_db} dB (DIN 45681)")
+    said.append(_prominent_words(found, run.name, name))
+    return "; ".join(said) + "."
+
+
+def _of_run_up(found: Tonality, run: MeasuredRun, name: str) -> str:
+    hearing = found.hearing.get(run.name)
+    rated = None if hearing is None else hearing.rated(name, ISO)
+    if rated is None:
+        return "not rated."
+    audible = int((rated.decisive_db > 0.0).sum())
+    said = [f"a run-up, a tone is audible in {audible} of {rated.decisive_db.size} spectra (ISO/TS 20065)"]
+    strongest = _most_audible(found.of(run.name, name, ISO))
+    if strongest:
+        said.append(f"most audible {joined([_tone_words(tone) for tone in strongest])}")
+    smeared = next((note for note in _notes_on(found, run.name, name) if note.startswith("the speed changes")), None)
+    return "; ".join([*said, *([smeared] if smeared else [])]) + "."
+
+
+def _notes_on(found: Tonality, run: str, name: str) -> tuple[str, ...]:
+    """Notes on a microphone of a run."""
+    rating = found.rating(run, name, ISO)
+    return () if rating is None else rating.notes
+
+
+def _most_audible(held: Iterable[RunTone]) -> list[RunTone]:
+    ranked = sorted((tone for tone in held if tone.audible is not False), key=lambda tone: -(tone.value_db or 0.0))
+    return ranked[:NAMED_TONES]
+
+
+def _tone_words(tone: RunTone) -> str:
+    speed = f" at {tone.speed.words()}" if tone.speed is not None else ""
+    return f"{tone.frequency_hz:.0f} Hz{speed} ({_origin_words(tone)})"
+
+
+def _origin_words(tone: RunTone) -> str:
+    """Order and owner in words; what nobody knows is said."""
+    if tone.owner == "unassigned" and tone.excitation == "unknown":
+        return "origin unknown"
+    excitation = "order unknown" if tone.excitation == "unknown" else tone.excitation
+    owner = "owner unknown" if tone.owner == "unassigned" else tone.owner
+    return f"{excitation}, {owner}"
+
+
+def _prominent_words(found: Tonality, run: str, channel: str) -> str:
+    held = [tone for tone in found.tones if (tone.run, tone.channel) == (run, channel) and tone.weighting == "Z"]
+    if not held:
+        rating = found.rating(run, channel, ECMA)
+        if rating is not None and rating.n_spectra:
+            return "no tone for ECMA-418-1"
+        return "ECMA-418-1 rates steady speeds alone"
+    prominent = {round(tone.frequency_hz, 3): tone for tone in held if tone.prominent}
+    if prominent:
+        names = [_tone_words(tone) for tone in list(prominent.values())[:NAMED_TONES]]
+        more = f" and {len(prominent) - NAMED_TONES} more" if len(prominent) > NAMED_TONES else ""
+        return f"prominent by ECMA-418-1: {', '.join(names)}{more}"
+    rated = [tone for tone in held if tone.value_db is not None]
+    if not rated:
+        return "no ratio by ECMA-418-1"
+    nearest = max(rated, key=lambda tone: (tone.value_db or 0.0) - tone.criterion_db)
+    ratio = nearest.method.removeprefix(f"{ECMA} ")
+    return (
+        f"no tone prominent by ECMA-418-1 (nearest: {nearest.frequency_hz:.0f} Hz, {ratio} {nearest.value_db:.1f} dB "
+        f"of {nearest.criterion_db:.1f} dB)"
+    )
+
+
+# ---------------------------------------------------------------- figures and tables
+
+
+def _figures(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> list[Block]:
+    origin = analysis.campaign.origin
+    blocks: list[Block] = []
+    overview = audibility_figure(analysis, found, microphones, ISO)
+    if overview is not None:
+        blocks.append(FigureBlock(overview, origin))
+    spectra = []
+    for condition in analysis.campaign.conditions():
+        held = [
+            (rating.mean_audibility_db or -100.0, run.name, name)
+            for run in _rated_runs(analysis, condition)
+            for name in microphones
+            if (rating := found.rating(run.name, name, ISO)) is not None
+        ]
+        for audibility, run, name in sorted(held, reverse=True):
+            figure = criterion_figure(analysis, found, run, name)
+            if figure is not None:
+                spectra.append((audibility, FigureBlock(figure, origin)))
+                break
+    if spectra:
+        best = max(range(len(spectra)), key=lambda index: spectra[index][0])
+        blocks.append(spectra[best][1])
+        others = [block for index, (_, block) in enumerate(spectra) if index != best]
+        if others:
+            blocks.append(Details(f"The same of {len(others)} more conditions", others))
+    moving = [figure for run in tested_runs(analysis) for figure in run_up_figures(found, run.name, microphones, ISO)]
+    return [*blocks, *(FigureBlock(figure, origin) for figure in moving)]
+
+
+def _table(analysis: Analysis, found: Tonality) -> Table:
+    """One row a microphone of a run."""
+    columns = (
+        Column("condition", "Condition"),
+        Column("run", "Run"),
+        Column("channel", "Microphone"),
+        Column("verdict", "By ISO/TS 20065"),
+        Column("mean_audibility_db", "Mean audibility", "dB", 1, "number"),
+        Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"),
+        Column("adjustment_db", "Adjustment", "DIN 45681, dB", 0, "number"),
+        Column("n_spectra", "Spectra", "", 0, "number"),
+        Column("most_audible", "Most audible"),
+        Column("prominent", "Prominent by ECMA-418-1"),
+    )
+    rows: list[list[Cell]] = []
+    for rating in found.ratings:
+        if rating.method != ISO or rating.speed is not None:
+            continue
+        din = found.rating(rating.run, rating.channel, DIN)
+        strongest = _most_audible(found.of(rating.run, rating.channel, ISO))[:1]
+        rows.append(
+            [
+                rating.condition,
+                rating.run,
+                rating.channel,
+                _verdict(rating),
+                rating.mean_audibility_db,
+                rating.uncertainty_db,
+                None if din is None else din.adjustment_db,
+                rating.n_spectra,
+                _tone_words(strongest[0]) if strongest else "none",
+                _prominent_cell(found, rating),
+            ]
+        )
+    return Table("tonality", "How tonal each microphone is", columns, rows, origin=analysis.campaign.origin)
+
+
+def _prominent_cell(found: Tonality, rating: RunTonality) -> str:
+    of_ecma = found.rating(rating.run, rating.channel, ECMA)
+    if of_ecma is None or not of_ecma.n_spectra:
+        return "not rated"
+    held = [tone for tone in found.tones if (tone.run, tone.channel) == (rating.run, rating.channel) and tone.prominent]
+    return ", ".join(dict.fromkeys(f"{tone.frequency_hz:.0f} Hz" for tone in held)) or "none"
+
+
+def _notes(ratings: Sequence[RunTonality]) -> list[str]:
+    """Each note once, with the runs and microphones that it is of where it is not of all."""
+    rated = [rating for rating in ratings if rating.speed is None and rating.method != ECMA]
+    places: dict[str, list[str]] = {}
+    for rating in rated:
+        for note in rating.notes:
+            places.setdefault(note, []).append(f"run {rating.run}, {rating.channel}")
+    everywhere = {f"run {rating.run}, {rating.channel}" for rating in rated}
+    said = []
+    for note, held in places.items():
+        own = list(dict.fromkeys(held))
+        where = "All" if len(own) >= MORE_THAN_ALL * len(everywhere) else "; ".join(own[:6])
+        more = f" and {len(own) - 6} more" if where != "All" and len(own) > 6 else ""
+        said.append(pretty_signs(f"{where}{more}: {note}."))
+    return said
+
+
+def _more_tables(analysis: Analysis, found: Tonality) -> list[Block]:
+    """Every tone, and the speed classes of run-ups, folded away."""
+    blocks: list[Block] = []
+    classes = [rating for rating in found.ratings if rating.speed is not None and rating.method == ISO]
+    if classes:
+        columns = (
+            Column("run", "Run"),
+            Column("channel", "Microphone"),
+            Column("speed", "Speed"),
+            Column("mean_audibility_db", "Mean audibility", "dB", 1, "number"),
+            Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"),
+            Column("n_spectra", "Spectra", "", 0, "number"),
+        )
+        rows: list[list[Cell]] = [
+            [r.run, r.channel, r.speed.words() if r.speed else "", r.mean_audibility_db, r.uncertainty_db, r.n_spectra]
+            for r in classes
+        ]
+        table = Table("tonality-classes", f"Audibility by speed class ({ISO})", columns, rows)
+        blocks.append(Details(f"Run-ups: {len(rows)} speed classes", [table]))
+    if found.tones:
+        blocks.append(Details(f"All {len(found.tones)} ratings of tones", [_tone_table(analysis, found.tones)]))
+    return blocks
+
+
+def _tone_table(analysis: Analysis, held: Sequence[RunTone]) -> Table:
+    columns = (
+        Column("run", "Run"),
+        Column("channel", "Microphone"),
+        Column("method", "Method"),
+        Column("speed", "Speed"),
+        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
+        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
+        Column("weighting", "Weighting"),
+        Column("value_db", "Value", "dB", 1, "number"),
+        Column("criterion_db", "Criterion", "dB", 1, "number"),
+        Column("verdict", "Verdict"),
+        Column("origin", "Order and owner"),
+        Column("notes", "Notes"),
+    )
+    rows: list[list[Cell]] = [
+        [
+            tone.run,
+            tone.channel,
+            tone.method,
+            "" if tone.speed is None else tone.speed.words(),
+            tone.frequency_hz,
+            tone.level_db,
+            tone.weighting,
+            tone.value_db,
+            tone.criterion_db,
+            _tone_verdict(tone),
+            _origin_words(tone),
+            "; ".join(tone.notes),
+        ]
+        for tone in held
+    ]
+    return Table("tones", "Tones by all methods", columns, rows, origin=analysis.campaign.origin)
+
+
+def _tone_verdict(tone: RunTone) -> str:
+    if tone.weighting == "Z":
+        return "not rated" if tone.prominent is None else "prominent" if tone.prominent else "not prominent"
+    return "not known" if tone.audible is None else "audible" if tone.audible else "not audible"
