@@ -77,17 +77,18 @@ def measured_sections(analysis: Analysis) -> list[Section]:
     found = [
         beside,
         sources(analysis),
-        kinematics(analysis),
         contributions(analysis),
         modes(analysis),
+        orders(analysis),
         tones(analysis),
         railway(analysis),
+        kinematics(analysis),
+        speed(analysis),
+        measured(analysis),
+        quality(analysis),
     ]
-    found += [measured(analysis), quality(analysis)]
     if len(analysis.tables["levels"]):
         found.append(levels(analysis))
     if any(run.measurement is not None for run in analysis.runs):
         found.append(spectra(analysis, fold=beside is not None))
-    found.append(orders(analysis))
-    found.append(speed(analysis))
     return [section for section in found if section is not None]

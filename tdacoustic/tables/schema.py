@@ -73,7 +73,8 @@ COLUMNS: Final = MappingProxyType(
         "level_error_db floor_db phase_deg phase_error_deg steadiness method reason",
         "sidebands": "run condition channel carrier carrier_order spacing spacing_orders speed_rpm pairs sidebands_db "
         "amplitude_depth phase_depth_rad reason",
-        "resonances": "run condition channel kind frequency_hz width_hz rise_db raised crossing confidence orders detail",
+        "resonances": "run condition channel kind frequency_hz width_hz rise_db raised crossing confidence orders "
+        "detail",
         "synchronous": "run condition channel shaft turns speed_rpm synchronous_db residual_db harmonic order name "
         "level_db level_error_db phase_deg phase_error_deg reason",
         "contributions": "run condition train_speed_km_h channel span kind order low_hz high_hz part level_db low_db "

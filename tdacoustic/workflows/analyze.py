@@ -144,9 +144,7 @@ Origins: TypeAlias = "tuple[list[str], tuple[LogInput, ...], tuple[tuple[str, Re
 """Problems, inputs and records."""
 
 
-def _assemble(
-    first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEvidence], origins: Origins
-) -> Analysis:
+def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEvidence], origins: Origins) -> Analysis:
     """Gather what stands above the single run: background, conditions, sources, dominance, tables."""
     from tdacoustic.attribution import ConditionEvidence, attribute, dominance_of_condition
     from tdacoustic.attribution.kinds_of_evidence import agreement_of_condition

@@ -13,6 +13,7 @@ from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.sections.contributions import agreement_words
+from tdacoustic.reporting.sections.order_sentences import loudest_order_words
 from tdacoustic.reporting.sections.words import (
     OWNER_SLOTS,
     condition_words,
@@ -76,7 +77,9 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
     if stated or not level:
         return f"{words}: {stated or 'no noise level, so no noise lines and no dominant source'}."
     if runs and all(run.measurement is not None and not run.measurement.steady for run in runs):
-        said = f"{words}: {level}; a run-up, so no lines and no dominant source."
+        orders = [loudest_order_words(analysis, run, receivers(analysis.runs)) for run in runs]
+        known = "; ".join(dict.fromkeys(text for text in orders if text))
+        said = f"{words}: {level}; a run-up, so no noise lines and no dominant source{f'; {known}' if known else ''}."
         return _with(said, agreement_words(analysis, condition))
     verdict = next((v for v in analysis.dominance if v.condition == condition), None)
     held = [source for source in analysis.sources if source.line.condition == condition]

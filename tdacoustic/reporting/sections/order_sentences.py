@@ -1,0 +1,121 @@
+"""Sentences on the orders of a run-up: which leads at which speeds, which resonances are passed, what stays in Hz."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.measured.order_results import ChannelOrders, RunOrders
+from tdacoustic.measured.runs import MeasuredRun
+from tdacoustic.orders import FixedFrequency
+from tdacoustic.recording import Channel
+from tdacoustic.reporting.sections.order_figures import leading_levels, order_words, sure_resonances
+from tdacoustic.reporting.sections.words import joined
+from tdacoustic.results import Analysis
+from tdacoustic.units import level_db
+
+__all__ = ["fixed_sentences", "leader_sentences", "loudest_order_words"]
+
+SAME_LINE: Final = 0.012
+"""Relative distance within which a line that is fixed in Hz is taken for a named one: a carrier is a percent off."""
+
+
+def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
+    """Which order is the strongest over which speeds."""
+    leading = leading_levels(held)
+    if not leading:
+        return [f"{channel.name}: no order stands 6 dB over its floor anywhere."]
+    size = max(item.speeds_hz.size for item in leading)
+    whole = [item for item in leading if item.speeds_hz.size == size]  # of the reference shaft: the same classes
+    power = np.array([np.where(item.usable & ~item.disturbed, item.mean_square, 0.0) for item in whole])
+    first = np.where(power.max(axis=0) > 0.0, np.argmax(power, axis=0), -1)
+    rpm = 60.0 * whole[0].speeds_hz
+    spans: list[tuple[int, int, int]] = []
+    for index, leader in enumerate(first.tolist()):
+        if spans and spans[-1][0] == leader:
+            spans[-1] = (leader, spans[-1][1], index)
+        else:
+            spans.append((leader, index, index))
+    sentences = []
+    counts = {leader: int(np.sum(first == leader)) for leader in set(first.tolist()) if leader >= 0}
+    for leader in sorted(counts, key=lambda item: -counts[item])[:2]:
+        item, own = whole[leader], [(a, b) for who, a, b in spans if who == leader]
+        loudest = int(np.argmax(np.where(first == leader, power[leader], 0.0)))
+        level = level_db(math.sqrt(power[leader][loudest]), channel.quantity)
+        at = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4]) + (" and elsewhere" if len(own) > 4 else "")
+        sentences.append(
+            f"{channel.name}: {order_words(item.order.name, item.order.order)} is the strongest order {at}, with up to "
+            f"{level:.1f} dB at {rpm[loudest]:.0f} rpm."
+        )
+    return sentences
+
+
+def _range_words(low: float, high: float) -> str:
+    return f"at {low:.0f} rpm" if low == high else f"from {low:.0f} to {high:.0f} rpm"
+
+
+def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list[str]:
+    """Resonances that are passed, and lines that stay in Hz, each with the channels that show it."""
+    groups: list[tuple[FixedFrequency, list[str]]] = []
+    for held in channels:
+        for item in held.fixed:
+            if item.kind == "resonance" and item not in sure_resonances(held):
+                continue
+            for other, names in groups:
+                if other.kind == item.kind and abs(other.frequency_hz / item.frequency_hz - 1.0) < SAME_LINE:
+                    names.append(held.channel)
+                    break
+            else:
+                groups.append((item, [held.channel]))
+    sentences = []
+    for item, names in sorted(groups, key=lambda group: group[0].frequency_hz):
+        if item.kind == "resonance":
+            passing = [
+                f"{order_words(order.name, order.order)} at {60.0 * item.frequency_hz / order.order:.0f} rpm"
+                for order in found.orders
+                if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
+            ]
+            width = f", {item.loss_factor * item.frequency_hz:.0f} Hz wide at most" if item.loss_factor > 0 else ""
+            sentences.append(
+                f"A resonance at {item.frequency_hz:.0f} Hz{width} raises what passes it by {item.rise_db:.0f} dB in "
+                f"{joined(names)}: {joined(passing[:4])}{' and others' if len(passing) > 4 else ''}."
+            )
+        else:
+            own = _curve_name(found, item.frequency_hz)
+            sentences.append(
+                f"A line at {item.frequency_hz:.1f} Hz{f' ({own})' if own else ''} stays where it is while the speed "
+                f"changes, in {joined(names)}: it is no order of the shaft."
+            )
+    return sentences
+
+
+def _curve_name(found: RunOrders, frequency_hz: float) -> str:
+    for curve in found.curves:
+        known = curve.frequencies_hz[np.isfinite(curve.frequencies_hz)]
+        if known.size and np.ptp(known) < 1e-6 * known[0] and abs(known[0] / frequency_hz - 1.0) < SAME_LINE:
+            return curve.name
+    return ""
+
+
+def loudest_order_words(analysis: Analysis, run: MeasuredRun, microphones: Sequence[str]) -> str:
+    """The order of most energy over a run-up's speeds, at the microphone where it is the loudest; or ``""``."""
+    found = analysis.orders.get(run.name)
+    if found is None or run.recording is None:
+        return ""
+    loudest: tuple[float, str] | None = None
+    for held in found.channels:
+        leading = leading_levels(held) if held.channel in microphones else []
+        if not leading:
+            continue
+        item = leading[0]
+        power = np.where(item.usable & ~item.disturbed, item.mean_square, 0.0)
+        top = int(np.argmax(power))
+        level = level_db(math.sqrt(float(power[top])), run.recording[held.channel].quantity)
+        if level is not None and (loudest is None or level > loudest[0]):
+            name = order_words(item.order.name, item.order.order)
+            rpm = 60.0 * item.speeds_hz[top]
+            loudest = (level, f"{name}, up to {level:.1f} dB at {rpm:.0f} rpm at {held.channel}")
+    return "" if loudest is None else f"strongest order {loudest[1]}"
