@@ -37,6 +37,7 @@ __all__ = [
     "Contributions",
     "RunState",
     "contributions_of_runs",
+    "paths_changed",
 ]
 
 SAME_LINES: Final = 1e-9
@@ -282,6 +283,11 @@ def _fitting(found: SpanContributions, own: _Own, span: Span) -> SpanContributio
         for name, part in found.groups.items()
     }
     return replace(found, groups=parts)
+
+
+def paths_changed(found: SpanContributions) -> bool:
+    """Whether the paths of all states do not fit this one: then its residual too is an upper bound."""
+    return any(part.reason.startswith(CHANGED) for part in found.groups.values())
 
 
 def _of_one_group(found: SpanContributions) -> SpanContributions:

@@ -16,6 +16,7 @@ from typing import Final
 import numpy as np
 
 from tdacoustic.attribution.contribution_spans import TONES, WHOLE
+from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.attribution.contributions import CampaignContributions, ContributionState
 from tdacoustic.attribution.dominance import DECIDED, largest_sources
 from tdacoustic.attribution.evidence import RunEvidence
@@ -121,6 +122,9 @@ def _contribution(condition: str, found: CampaignContributions | None) -> tuple[
     together = {name: float(np.mean([parts.largest.get(name, 0.0) for _, parts in rows])) for name in names}
     leading = max(together, key=lambda name: together[name])
     if leading == RESIDUAL:
+        changed = [parts for _, parts in rows if paths_changed(parts)]
+        if 2 * len(changed) >= len(rows):  # what the paths of all states leave says nothing here
+            return None, f"flagged, {next(iter(changed[0].groups.values())).reason}"
         return together, f"most of the {what} is explained by no sensor"
     doubts = [(state, part) for state, parts in rows if (part := parts.groups[leading]).verdict != "ok"]
     if not doubts:

@@ -268,13 +268,13 @@ def _part(
     if whole <= 0.0:
         depends, words = "undecided", f"no power in {mode}"
     elif high < 0.0:
-        words = f"coasting is louder than {mode}: nothing here is torque's, and coasting adds something of its own"
+        words = f"coasting is louder than {mode}: nothing comes with the torque, and coasting adds something of its own"
     elif depends == "torque":
         words = f"most of it comes and goes with the torque: {within}"
     elif depends == "speed":
-        words = f"most of it is there without torque: {within} is torque's"
+        words = f"most of it is there without torque: {within} comes with the torque"
     else:
-        words = f"not decided: {within} is torque's"
+        words = f"not decided: {within} comes with the torque"
     return ModePart(
         mode,
         band,

@@ -22,6 +22,9 @@ MOTOR_SHAFT_HARMONICS: Final = 4
 WHEELSET_HARMONICS: Final = 4
 """Of unbalance and out-of-round wheels [assumed]."""
 
+MOST_MESH_HARMONICS: Final = 1000
+"""Of each pair: a drive that all but stands has millions below any frequency, and none of them is heard."""
+
 
 @dataclass(frozen=True)
 class Excitation:
@@ -61,7 +64,7 @@ def _of_order(
 
 
 def mesh_excitations(orders: Mapping[str, float], motor_hz: float, highest_hz: float) -> Iterator[Excitation]:
-    """Yield the mesh harmonics of each pair up to a frequency; none at standstill.
+    """Yield the mesh harmonics of each pair up to a frequency, `MOST_MESH_HARMONICS` at most; none at standstill.
 
     Parameters
     ----------
@@ -72,7 +75,8 @@ def mesh_excitations(orders: Mapping[str, float], motor_hz: float, highest_hz: f
     for pair, order in orders.items():
         label = "mesh" if len(orders) == 1 else f"mesh {pair}"
         first_hz = order * motor_hz
-        for harmonic in range(1, int(highest_hz / first_hz * (1.0 + 1e-12)) + 1 if first_hz > 0.0 else 0):
+        held = highest_hz / first_hz * (1.0 + 1e-12) if first_hz > 0.0 else 0.0
+        for harmonic in range(1, int(min(held, MOST_MESH_HARMONICS)) + 1):
             yield _of_order(f"{label} x{harmonic}", "mesh", harmonic * order, motor_hz, pair, harmonic)
 
 

@@ -117,12 +117,12 @@ class MapPass:
         speeds = span.speed_rows(rows_for(frames, 1.5, 4, MAP_SPEEDS))
         n_times = rows_for(frames, 1.0, 4, MAP_TIMES)
         times = TimeRows(span.start_s, span.duration_s / n_times, n_times)
-        self._by_speed = MapMeter(plan, speeds, channels, "order", span.highest_order, rate)
-        self._by_time = MapMeter(plan, times, channels, "order", span.highest_order, rate)
+        self._by_speed = MapMeter(plan, speeds, channels, "order", span.highest_order, rate, errors=False)
+        self._by_time = MapMeter(plan, times, channels, "order", span.highest_order, rate, errors=False)
         self.shaft.read_by(plan, [self._by_speed, self._by_time])
         seconds = plan_line_frames(rate, min(max(resolution_hz, 4.0 / span.duration_s), rate / 16.0), overlap=0.5)
         self._even = EvenTime(angle, rate, span.start_s)
-        self._by_frequency = MapMeter(seconds, speeds, channels, "frequency", 0.5 * rate, rate)
+        self._by_frequency = MapMeter(seconds, speeds, channels, "frequency", 0.5 * rate, rate, errors=False)
         self._seconds = Frames(seconds, [self._by_frequency])
 
     def take(self, block: Array) -> None:

@@ -33,11 +33,11 @@ Array = NDArray[np.float64]
 MOST_TRACKED: Final = 4
 """Orders that are tracked where nobody says which."""
 LEAST_STRENGTH: Final = 0.01
-"""Of an order that is tracked unasked: share of the energy of all orders."""
+"""Of an order that is tracked unasked: share of the energy of all orders [assumed]."""
 LOSS_FACTOR: Final = 0.05
 """Of the resonances whose passing a tracked order is to follow [assumed]; narrower ones come out rounded."""
 NEAR_SHARE: Final = 0.1
-"""Strength over that of a tracked order from which on another one has to be kept out."""
+"""Strength over that of a tracked order from which on another one has to be kept out [assumed]."""
 MOST_NODES: Final = 2000
 """Nodes of a track that are kept over time."""
 DOUBTS: Final = (4, 5, 6)
@@ -241,14 +241,14 @@ class TrackSums:
         skip = (-self._seen) % self._stride
         self._seen += piece.times_s.size
         span = slice(skip, None, self._stride)
-        self._kept.append(
+        self._kept.append(  # copies: a view would hold all of the piece, and memory would grow with the record
             OrderTrack(
                 piece.order,
-                piece.times_s[span],
-                piece.speeds_hz[span],
-                piece.amplitude[:, span],
-                piece.error[:, span],
-                piece.reason[:, span],
+                piece.times_s[span].copy(),
+                piece.speeds_hz[span].copy(),
+                piece.amplitude[:, span].copy(),
+                piece.error[:, span].copy(),
+                piece.reason[:, span].copy(),
             )
         )
 

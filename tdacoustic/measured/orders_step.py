@@ -47,7 +47,7 @@ FINE_CELLS: Final = 800
 """Lines of a map that are kept one by one; above, each cell holds the strongest of ever more."""
 COARSE_CELLS: Final = 600
 FEWEST_TURNS: Final = 12.0
-"""Below, a run says nothing about its orders."""
+"""Below, a run says nothing about its orders [assumed]."""
 MOST_FOUND: Final = 12
 """Orders that nobody named, of all channels together."""
 
@@ -106,12 +106,12 @@ class OrderSettings:
 
 
 def run_orders(settings: OrderSettings, logs: tuple[LogFile, ...], speed: RunSpeed) -> RunOrders:
-    """Step: the orders of a run.
+    """Step: the orders of a run; a raster that has none stops no other.
 
     Raises
     ------
     AnalysisError
-        The angle of the shaft is nowhere known, or it turns too little.
+        The angle of the shaft is nowhere known, or it turns too little while any raster was recorded.
     """
     angle = _reference(settings, speed)
     recording = Recording("run", tuple(scan(log.path) for log in logs), settings.channels)
@@ -121,14 +121,22 @@ def run_orders(settings: OrderSettings, logs: tuple[LogFile, ...], speed: RunSpe
     spans: list[RasterSpan] = []
     orders: dict[str, NamedOrder] = {order.name: order for order in settings.orders}
     bandwidth = 0.0
+    refused: list[AnalysisError] = []
     for number, group in enumerate(names):
         before = sum(sizes[:number]) / sum(sizes)
         share = sizes[number] / sum(sizes)
-        found = _Raster(settings, recording, group, angle).orders(_Teller(before, share))
+        try:
+            found = _Raster(settings, recording, group, angle).orders(_Teller(before, share))
+        except AnalysisError as error:
+            refused.append(error)
+            channels += [ChannelOrders(name, notes=(f"no orders of {name}: {error}",)) for name in group]
+            continue
         channels += found.channels
         spans.append(found.span)
         orders |= {order.name: order for order in found.orders}
         bandwidth = max(bandwidth, found.bandwidth)
+    if not spans:
+        raise refused[0]
     position = {channel.name: index for index, channel in enumerate(settings.channels)}
     return RunOrders(
         shaft=settings.shaft,
@@ -196,7 +204,7 @@ class _Raster:
         named = [order.order for order in self.settings.orders]
         apart = max(self.settings.bandwidth, 4.0 * order_map.resolution)
         new = find_orders(order_map, named, apart)[:MOST_FOUND]
-        found = [NamedOrder(f"order {order:.4g}", "found", order, self.settings.shaft) for order in new]
+        found = _named(new, self.settings)
         further = self._cut_pass(found, known=cuts.orders, edges_hz=cuts.edges_hz if cuts.orders else ())
         edges_hz = (cuts if cuts.orders else further).edges_hz
         tracks = self._track_pass((*cuts.orders, *further.orders), edges_hz, order_map)
@@ -298,6 +306,18 @@ def _span(first: Channel, angle: ShaftAngle, settings: OrderSettings, names: tup
         steady=settings.steady,
         shaft=settings.shaft,
     )
+
+
+def _named(found: Sequence[float], settings: OrderSettings) -> list[NamedOrder]:
+    """Orders that nobody named, by their number; two that four digits do not tell apart have more."""
+    taken = {order.name for order in settings.orders}
+    named = []
+    for order in found:
+        spellings = [f"order {order:.{digits}g}" for digits in (4, 6, 9)]
+        name = next((text for text in spellings if text not in taken), spellings[-1])
+        taken.add(name)
+        named.append(NamedOrder(name, "found", order, settings.shaft))
+    return named
 
 
 def _level_map(held: OrderMap, over: str, index: int) -> LevelMap:

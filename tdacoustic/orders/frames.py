@@ -246,7 +246,7 @@ class Frames:
         with np.errstate(invalid="ignore"):
             values = framed(joined.values) * self._window
             lines = scipy.fft.rfft(values, axis=-1, overwrite_x=True)
-        lines[..., [0, -1]] *= math.sqrt(0.5)
+            lines[..., [0, -1]] *= math.sqrt(0.5)
         probes = np.linspace(0, plan.length - 1, 9).astype(int)
         speeds, times = framed(joined.speeds_hz)[:, probes], framed(joined.times_s)
         frames = FrameTransforms(

@@ -40,7 +40,7 @@ class OrderMap:
     mean_square : ndarray of float32, shape (n_channels, n_rows, n_lines)
         Of a line, unit²: a tone on a line reads its mean square. A density is this over `noise_bandwidth`.
     error : ndarray of float32, same shape
-        Standard error of the mean from the scatter of the frames; 0 of one alone.
+        Standard error of the mean from the scatter of the frames; 0 of one alone, NaN where nobody asked for it.
     highest : ndarray, shape (n_rows,)
         Order (or Hz) up to which the row is flat: beyond, the sampling rate does not hold it.
     """
@@ -153,6 +153,8 @@ class MapMeter:
         Order, or Hz, up to which lines are kept.
     sample_rate_hz : float
         Of the time signal: says what it cannot hold.
+    errors : bool
+        Whether the scatter of the frames is kept: it takes as much memory as the map, and time.
 
     Raises
     ------
@@ -173,6 +175,7 @@ class MapMeter:
         domain: Literal["order", "frequency"],
         highest: float,
         sample_rate_hz: float,
+        errors: bool = True,
     ) -> None:
         self.plan, self.domain, self._rate_hz, self._limit = plan, domain, sample_rate_hz, highest
         self._n_lines = min(plan.n_lines, int(np.floor(highest / plan.resolution + 1e-9)) + 1)
@@ -184,7 +187,7 @@ class MapMeter:
             )
         self._sums = RowSums(rows, n_channels)
         self._mean = np.zeros(shape, dtype=np.float32)
-        self._spread = np.zeros(shape, dtype=np.float32)
+        self._spread = np.zeros(shape, dtype=np.float32) if errors else None
 
     def take(self, frames: FrameTransforms) -> None:
         """Add frames, in order: mean and squared deviations by the steps of B. P. Welford (Technometrics 4 (1962))."""
@@ -217,7 +220,7 @@ class MapMeter:
         self, row: int, before: NDArray[np.int64], power: NDArray[np.float32], channels: slice = slice(None)
     ) -> None:
         """Join frames, shape (n, channels, lines), with the `before` frames that a row has."""
-        mean, spread = self._mean[row, channels], self._spread[row, channels]
+        mean = self._mean[row, channels]
         number = power.shape[0]
         if number == 1 and not before.any():
             mean[:] = power[0]
@@ -225,7 +228,9 @@ class MapMeter:
         fresh = power.mean(axis=0)
         total = (before + number)[:, None]
         apart = fresh - mean
-        spread += ((power - fresh) ** 2).sum(axis=0) + apart**2 * (before[:, None] * number / total).astype(np.float32)
+        if self._spread is not None:
+            spread, weight = self._spread[row, channels], (before[:, None] * number / total).astype(np.float32)
+            spread += ((power - fresh) ** 2).sum(axis=0) + apart**2 * weight
         mean += apart * (number / total).astype(np.float32)
 
     def result(self) -> OrderMap:
@@ -245,11 +250,8 @@ class MapMeter:
         times, speeds = self._sums.means()
         n_frames = self._sums.valid[:, filled]
         averages = self.plan.independent(n_frames)
-        mean, spread = (np.moveaxis(values[filled], 0, 1) for values in (self._mean, self._spread))
-        number = n_frames[:, :, None]
-        with np.errstate(invalid="ignore", divide="ignore"):
-            error = np.sqrt(spread / np.maximum(number - 1, 1) / averages[:, :, None])
-        mean, error = np.where(number > 0, mean, np.nan), np.where(number > 0, error, np.nan)
+        mean = np.moveaxis(self._mean[filled], 0, 1)
+        mean[n_frames == 0] = np.nan
         flat = PASS_SHARE * self._rate_hz
         with np.errstate(divide="ignore", invalid="ignore"):
             highest = flat / self._sums.fastest_hz[filled] if self.domain == "order" else np.full(filled.size, flat)
@@ -261,7 +263,17 @@ class MapMeter:
             speeds_hz=speeds,
             n_frames=n_frames,
             averages=averages,
-            mean_square=mean.astype(np.float32),
-            error=error.astype(np.float32),
+            mean_square=mean,
+            error=self._error(filled, n_frames, averages),
             highest=np.minimum(highest, self._limit),
         )
+
+    def _error(self, filled: NDArray[np.intp], n_frames: NDArray[np.int64], averages: Array) -> NDArray[np.float32]:
+        """Standard errors, in single precision and in place: maps are large."""
+        if self._spread is None:
+            return np.broadcast_to(np.float32(np.nan), (*n_frames.shape, self._n_lines))
+        held = n_frames > 0
+        share = np.where(held, 1.0 / (np.maximum(n_frames - 1, 1) * np.where(held, averages, 1.0)), np.nan)
+        error = np.moveaxis(self._spread[filled], 0, 1)
+        error *= share[:, :, None].astype(np.float32)
+        return np.asarray(np.sqrt(error, out=error))

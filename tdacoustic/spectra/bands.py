@@ -95,14 +95,18 @@ class _Stage:
         self.seen += block.shape[1]
 
     def decimate(self, block: Array) -> Array:
-        """Return every second low-passed sample, whatever the blocks' lengths."""
+        """Return every second low-passed sample, whatever the blocks' lengths.
+
+        Every second tap of a half-band filter is 0 but for the middle one, which is odd: it alone meets odd samples.
+        """
         data = np.concatenate((self._history, block), axis=1)
         self._history = data[:, data.shape[1] - (DECIMATOR_TAPS - 1) :]
-        valid = signal.upfirdn(self._taps, data[:, self._phase :], 1, 2, axis=-1)
-        first = (DECIMATOR_TAPS - 1) // 2
+        even, odd = (np.ascontiguousarray(data[:, self._phase + start :: 2]) for start in (0, 1))
+        middle = (DECIMATOR_TAPS - 1) // 2
         n_out = (block.shape[1] - self._phase + 1) // 2
         self._phase = (self._phase + block.shape[1]) % 2
-        return np.ascontiguousarray(valid[:, first : first + n_out])
+        out: Array = signal.upfirdn(self._taps[::2], even, 1, 1, axis=-1)[:, middle : middle + n_out]
+        return out + self._taps[middle] * odd[:, middle // 2 : middle // 2 + n_out]
 
 
 class ThirdOctaveMeter:

@@ -13,6 +13,9 @@ __all__ = ["SpeedChannelMeter"]
 
 Array = NDArray[np.float64]
 
+ROUNDING = 1e-9
+"""Relative difference of two samples that is none."""
+
 
 class SpeedChannelMeter:
     """Averages a speed channel over intervals, block by block.
@@ -29,11 +32,15 @@ class SpeedChannelMeter:
         self._size = max(1, round(interval_s * sample_rate_hz))
         self._pending = np.zeros(0)
         self._means: list[Array] = []
+        self._resolution = np.inf
 
     def take(self, values: Array) -> None:
         """Add samples, shape (n,), in order."""
         data = np.concatenate((self._pending, values))
         whole = data.size - data.size % self._size
+        steps = np.abs(np.diff(data))
+        steps = steps[steps > ROUNDING * np.abs(data[1:])]
+        self._resolution = min(self._resolution, float(np.min(steps, initial=np.inf)))
         if whole:
             self._means.append(data[:whole].reshape(-1, self._size).mean(axis=1))
         self._pending = data[whole:]
@@ -51,7 +58,9 @@ class SpeedChannelMeter:
     def profile(self, name: str, shaft: str | None, si_symbol: str, start_s: float = 0.0) -> SpeedProfile:
         """Return the speed on the run's time axis, on which the first sample is at `start_s`.
 
-        Its error is the scatter of its values; where the channel holds no numbers for a while, it is not known.
+        Its error is the scatter of its values, at least that of rounding to the smallest step between two samples; None
+        where these never differ, so that nothing tells it. Where the channel holds no numbers for a while, the speed is
+        not known.
 
         Raises
         ------
@@ -79,10 +88,16 @@ class SpeedChannelMeter:
             values,
             tuple(notes),
             doubtful=bool(unknown),
-            error=_scatter(times, values),
+            error=self._error(times, values),
             unknown=unknown,
             faults=faults,
         )
+
+    def _error(self, times: Array, values: Array) -> Array | None:
+        scatter = _scatter(times, values)
+        if scatter is None or not np.isfinite(self._resolution):
+            return None
+        return np.hypot(scatter, self._resolution / np.sqrt(12.0))
 
 
 def _scatter(times: Array, values: Array) -> Array | None:

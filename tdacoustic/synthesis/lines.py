@@ -149,6 +149,7 @@ def place_line(
             if channel.name in own or channel in sources:
                 continue
             turn = generator(seed, "path", path.source, channel.name, name).uniform(0.0, 2.0 * np.pi)
+            turn = 0.0 if path.phase == "path" else turn
             gain = 10.0 ** (path.gain_db / 20.0) * channel.reference / sources[0].reference
             parts.append(LinePart(channel.name, start.rms * gain, start.phase_rad + turn, False, path))
     return PlacedLine(name, line, frequency, turns, tuple(parts))

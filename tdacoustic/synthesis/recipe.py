@@ -219,7 +219,9 @@ class PathRecipe(_Strict):
     `gain_db` is the level in the channel minus the level in the component's first channel, each re its own reference;
     `broadband_gain_db` the same for that channel's broadband (left out: only lines pass). The coherence at one
     frequency between both ends is `coherence` (magnitude squared, of what passes); the rest is independent, for lines a
-    slow random variation within `coherence_bandwidth_hz`. `delay_s` turns the phase.
+    slow random variation within `coherence_bandwidth_hz`. `delay_s` turns the phase; each line is turned by a random
+    angle of its own too, unless ``phase = "path"``: then lines and broadband take one and the same linear path, as long
+    as both gains are equal.
     """
 
     source: Component = Field(alias="from")
@@ -227,6 +229,7 @@ class PathRecipe(_Strict):
     gain_db: Finite
     broadband_gain_db: Finite | None = None
     delay_s: Annotated[float, Field(ge=0, le=1)] = 0.0
+    phase: Literal["line", "path"] = "line"
     coherence: Annotated[float, Field(ge=0, le=1)] = 1.0
     coherence_bandwidth_hz: Positive = 0.5
 

@@ -4,9 +4,10 @@
 noise lines together), ``broadband`` (the rest), ``band`` (a third octave), ``order`` (of the kinematics; ``order`` per
 turn of the motor, empty of the inverter's), ``tone`` (a noise line that no order owns). ``part``: a component,
 ``residual`` (what no sensor explains), ``total`` (what the microphone measured). ``level_db`` is empty of what is
-``refused`` and where nothing is above its scatter, ``low_db`` where there is no lower bound; ``reason`` says why.
-``path_level_db`` is what plain operational transfer paths say, cross-talk included. ``probability_largest`` is that of
-the part to be the largest of its span, ``n_states`` the number of operating states behind the paths.
+``refused`` and where nothing is above its scatter, ``low_db`` where there is no lower bound; ``reason`` says why. What
+no sensor explains is ``flagged`` where the paths differ from state to state. ``path_level_db`` is what plain
+operational transfer paths say, cross-talk included. ``probability_largest`` is that of the part to be the largest of
+its span, ``n_states`` the number of operating states behind the paths.
 
 *coherence*: squared coherences at the lines that matter: noise lines, or the loudest lines of a state without any.
 ``other`` is the receiver, or the second reference of ``kind`` ``references``. ``value`` is as estimated, ``corrected``
@@ -22,6 +23,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from tdacoustic.attribution.contribution_spans import NamedSpan
+from tdacoustic.attribution.contribution_step import CHANGED, paths_changed
 from tdacoustic.attribution.contributions import CampaignContributions
 from tdacoustic.attribution.mode_comparison import SpeedModes
 from tdacoustic.contributions import RESIDUAL, SpanContributions
@@ -34,6 +36,7 @@ if TYPE_CHECKING:
 __all__ = ["contribution_tables", "power_db"]
 
 SILENT = "no power"
+BOUND = f"{CHANGED}: an upper bound"
 UNDETERMINED = "one of both has no power of its own, or none is left"
 
 
@@ -97,8 +100,8 @@ def _part_rows(parts: SpanContributions) -> Iterator[Row]:
     yield {
         "part": RESIDUAL,
         **_levels(parts.residual, parts.residual_low, parts.residual_high),
-        "verdict": "ok",
-        "reason": "" if parts.residual > 0.0 else SILENT,
+        "verdict": "flagged" if paths_changed(parts) else "ok",
+        "reason": BOUND if paths_changed(parts) else "" if parts.residual > 0.0 else SILENT,
         "probability_largest": parts.largest.get(RESIDUAL),
     }
 

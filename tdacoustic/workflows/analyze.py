@@ -187,7 +187,7 @@ def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEv
     problems += not_rated
     orders = second.of_kind("orders")
     contributions, modes = campaign_contributions(first, second), campaign_modes(first, second)
-    problems += missing_components(first) if second.made else []
+    problems += missing_components(first, second) if second.made else []
     agreements = {
         known.condition: agreement_of_condition(known, campaign.excludes, _seed(known), contributions)
         for known in (asked if second.made else ())

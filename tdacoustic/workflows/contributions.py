@@ -45,11 +45,11 @@ DRAWS: Final = 60
 CLASSES: Final = 6
 """Operating states of a run-up, at most."""
 CLASS_RATIO: Final = 1.1
-"""Highest over lowest speed of such a state, at least."""
+"""Highest over lowest speed of such a state, at least [assumed]."""
 CLASS_SEGMENTS: Final = 3
 """Segments of such a state, at least."""
 STANDS: Final = 0.05
-"""Part of a run-up's highest speed below which it stands."""
+"""Part of a run-up's highest speed below which it stands [assumed]."""
 MOST_STATES: Final = 32
 """More take memory and time, and tell little more."""
 LOWEST_HZ: Final = 20.0
@@ -109,7 +109,7 @@ def _cross_settings(first: FirstPass, run: MeasuredRun) -> CrossSpectraSettings 
 
 
 def contribution_task(first: FirstPass, done: Mapping[str, Task]) -> Task | None:
-    """Return the task of the whole campaign, or None where no run has cross spectra.
+    """Return the task of the whole campaign, or None where no run has cross spectra or is an operating state.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def contribution_task(first: FirstPass, done: Mapping[str, Task]) -> Task | None
         By run, the cross spectra that could be computed.
     """
     plan = contribution_plan(first, done)
-    if plan is None:
+    if plan is None or not plan.states:
         return None
     label = f"{len(plan.states)} operating state{'s' if len(plan.states) != 1 else ''}"
     return CONTRIBUTIONS.task(label, plan.settings, **{name: done[run] for name, run in plan.sources.items()})
@@ -188,7 +188,7 @@ def _plan(
         assert settings is not None
         of_run = _states_of(first, run, settings, str(number), heard)
         if not of_run:
-            notes.append(f"run {name}: its speed is not known over time, so it is no operating state")
+            notes.append(f"run {name}: {_why_no_state(first, run)}, so it is no operating state")
             continue
         if len(states) + len(of_run) > MOST_STATES:
             notes.append(f"run {name}: {MOST_STATES} operating states are taken at most")
@@ -284,6 +284,12 @@ def _states_of(
     return found
 
 
+def _why_no_state(first: FirstPass, run: MeasuredRun) -> str:
+    if run_speeds(run, first.drive(run), np.zeros(0)) is None:
+        return "its speed is not known over time"
+    return f"it has at no speed the {CLASS_SEGMENTS} segments that a state takes"
+
+
 def _classes(speed: np.ndarray) -> list[tuple[int, ...]]:
     """Segments of a run-up by speed, slow ones first; those where it stands or is not known belong to none."""
     known = np.isfinite(speed) & (np.nan_to_num(speed) > STANDS * np.nanmax(speed, initial=0.0))
@@ -299,12 +305,23 @@ def _classes(speed: np.ndarray) -> list[tuple[int, ...]]:
     return [segments for segments in members if len(segments) >= CLASS_SEGMENTS]
 
 
-def missing_components(first: FirstPass) -> list[str]:
-    """Return what keeps a campaign with sensors and microphones from contributions, one line."""
+def missing_components(first: FirstPass, second: SecondPass) -> list[str]:
+    """Return what keeps a campaign with sensors and microphones from contributions, one line.
+
+    Parameters
+    ----------
+    first : FirstPass
+    second : SecondPass
+    """
     recordings = [run.recording for run in first.measured if run.recording is not None]
     sensors = {c.name for recording in recordings for c in recording.channels if c.quantity == "acceleration"}
-    if not sensors or not receivers(first.runs) or any(_channels(first, run).references for run in first.measured):
+    if not sensors or not receivers(first.runs):
         return []
+    if any(_channels(first, run).references for run in first.measured):
+        plan = contribution_plan(first, second.done.get(RUN_KIND, ()))
+        if plan is None or plan.states:
+            return []
+        return [f"no contributions of components: {'; '.join(plan.notes)}"]
     named = {c.name for recording in recordings for c in recording.channels if c.component is not None}
     why = "is in order and of the same clock as a microphone" if sensors & named else "names the component it sits on"
     return [f"no contributions of components: no accelerometer {why}"]

@@ -12,6 +12,7 @@ import numpy as np
 from tdacoustic.measured.orders_step import ORDERS, OrderSettings
 from tdacoustic.orders import FrequencyCurve, NamedOrder, OrderKind
 from tdacoustic.orders.resampling import PASS_SHARE
+from tdacoustic.speed.profile import STANDSTILL
 from tdacoustic.units import REFERENCES
 
 if TYPE_CHECKING:
@@ -58,9 +59,13 @@ class _Teller:
     counted: bool
 
     def speeds_hz(self) -> tuple[float, float, float]:
-        """Lowest, middle and highest speed of the reference shaft while it turns."""
+        """Lowest, middle and highest speed of the reference shaft while it turns, what reads as a standstill left out.
+
+        Its angle is not known there, and the scatter of a sensor is no speed at which orders lie anywhere.
+        """
         speeds = np.abs(self.profile.speed) * self.turns_per_unit
-        low, middle, high = np.percentile(speeds[speeds > 0.0], [0.5, 50.0, 99.5])
+        turning = speeds[speeds >= STANDSTILL["1/s"]]
+        low, middle, high = np.percentile(turning if turning.size else speeds[speeds > 0.0], [0.5, 50.0, 99.5])
         return float(low), float(middle), float(high)
 
 
@@ -71,18 +76,36 @@ def order_tasks(first: FirstPass) -> dict[str, Task]:
 
 def order_problems(first: FirstPass) -> list[str]:
     """Return what of the orders that the campaign asks for cannot be had, one line each."""
-    analysis = first.campaign.analysis
-    if not analysis.orders:
-        return []
-    asked = "orders " + ", ".join(f"{order:g}" for order in analysis.orders)
+    orders = _asked(first.campaign.analysis)
+    asked = "orders " + ", ".join(f"{order:g}" for order in orders)
     found: dict[str, list[str]] = {}
+    strange: dict[str, list[str]] = {}
     for run, teller in _tellers(first):
         if isinstance(teller, str):
-            found.setdefault(teller, []).append(run.name)
+            if orders:
+                found.setdefault(f"{asked} are not cut in run{{s}} {{runs}}: {teller}", []).append(run.name)
+        elif (words := _of_other_drives(run, teller)) is not None:
+            strange.setdefault(words, []).append(run.name)
     return [
-        f"{asked} are not cut in run{'s' if len(runs) > 1 else ''} {', '.join(runs)}: {why}"
-        for why, runs in found.items()
+        text.format(s="s" if len(runs) > 1 else "", runs=", ".join(runs)) for text, runs in {**found, **strange}.items()
     ]
+
+
+def _of_other_drives(run: MeasuredRun, teller: _Teller) -> str | None:
+    """Sensors whose orders are cut over the angle of another drive's shaft, in words; None where there are none."""
+    assert run.recording is not None
+    channels = {channel.name: channel for channel in run.recording.channels}
+    if teller.profile.channel not in channels or channels[teller.profile.channel].quantity not in ("speed", "tacho"):
+        return None
+    drive = channels[teller.profile.channel].drive
+    others = [name for name in _channels(run) if channels[name].quantity != "sound_pressure"]
+    others = [name for name in others if channels[name].drive != drive]
+    if not others or teller.profile.si_symbol == "m/s":
+        return None
+    return (
+        f"orders of {', '.join(others)} in run{{s}} {{runs}} are cut over the angle of {teller.profile.channel}, "
+        f"a shaft of drive {drive}, which need not turn as fast as their own"
+    )
 
 
 def _tellers(first: FirstPass) -> Iterator[tuple[MeasuredRun, _Teller | str]]:
@@ -141,8 +164,9 @@ def _task(first: FirstPass, run: MeasuredRun, teller: _Teller) -> Task:
     rate = max(channel.sample_rate_hz for channel in channels)
     drive = first.drive(run) if teller.shaft == "motor" else None
     low, middle, high = teller.speeds_hz()
-    highest = _highest_order(analysis, drive, PASS_SHARE * rate / middle)
-    orders, curves = expected_orders(drive, analysis.orders, teller.shaft, (low, high), highest, 0.5 * rate)
+    asked = _asked(analysis)
+    highest = _highest_order(analysis, asked, drive, PASS_SHARE * rate / middle)
+    orders, curves = expected_orders(drive, asked, teller.shaft, (low, high), highest, 0.5 * rate)
     ratios = () if drive is None else (("wheelset", drive.wheelset_order),)
     settings = OrderSettings(
         channels=channels,
@@ -180,12 +204,18 @@ def _spacings(drive: Kinematics | None, shaft: str) -> tuple[tuple[str, float], 
     return tuple(zip(names, drive.shaft_orders, strict=True))
 
 
-def _highest_order(analysis: AnalysisSettings, drive: Kinematics | None, held: float) -> float:
+def _asked(analysis: AnalysisSettings) -> tuple[float, ...]:
+    """Orders that the campaign names: to be cut, or to be tracked, which are cut too."""
+    tracked = () if isinstance(analysis.vold_kalman, bool) else analysis.vold_kalman
+    return tuple(dict.fromkeys((*analysis.orders, *tracked)))
+
+
+def _highest_order(analysis: AnalysisSettings, orders: Sequence[float], drive: Kinematics | None, held: float) -> float:
     """Order up to which maps reach: as asked, else ten mesh harmonics, as far as the rate holds them at mid speed."""
     if analysis.highest_order is not None:
         return analysis.highest_order
     wanted = HIGHEST_UNNAMED if drive is None else (MESH_HARMONICS + ABOVE_MESH) * max(drive.mesh_orders.values())
-    asked = max(analysis.orders, default=0.0) + 2.0 * analysis.order_bandwidth
+    asked = max(orders, default=0.0) + 2.0 * analysis.order_bandwidth
     return max(min(wanted, held), asked)
 
 

@@ -246,3 +246,8 @@ def test_an_excitation_is_expected_only_where_its_amplitude_is():
 def test_what_cannot_be_is_refused(call, message):
     with pytest.raises(FleetError, match=message):
         call()
+
+
+def test_a_drive_that_all_but_stands_has_no_endless_row_of_harmonics():
+    meshes = [e for e in PAPER.excitations(1e-9, 25600.0) if e.kind == "mesh"]
+    assert len(meshes) == 1000 and meshes[-1].harmonic == 1000

@@ -269,3 +269,28 @@ def test_without_a_tacho_nothing_is_averaged_over_turns(monkeypatch):
     recording = recording_of(STEADY.order(31.0) + STEADY.noise(1e-6), STEADY.rate_hz, "acceleration")
     result = orders_of(monkeypatch, recording, speed_of(STEADY), steady=True, counted=False)
     assert result.channels[0].averages == ()
+
+
+def test_a_thinned_track_holds_no_more_than_it_keeps():
+    """A view of what the filter returns would hold all of it: memory would grow with the record."""
+    from tdacoustic.measured.order_tracks import TrackSums
+    from tdacoustic.orders import NamedOrder, OrderTrack, TrackedOrder
+    from tdacoustic.speed import ShaftAngle
+
+    angle = ShaftAngle([0.0, 1.0, 2.0], [0.0, 10.0, 20.0])
+    sums = TrackSums(NamedOrder("o", "asked", 2.0, ""), (), (5.0, 15.0), 1, 100_000, 1.0)
+    nodes = np.ones((1, 1000))
+    piece = (np.linspace(0.0, 2.0, 1000), np.full(1000, 10.0), nodes.astype(complex), nodes, nodes.astype(np.int8))
+    sums.take(OrderTrack(TrackedOrder(angle, 2.0, 1.0, "o"), *piece))
+    (kept,) = sums._kept
+    arrays = (kept.times_s, kept.speeds_hz, kept.amplitude, kept.error, kept.reason)
+    assert all(array.base is None and array.shape[-1] == 20 for array in arrays)
+
+
+def test_orders_that_four_digits_do_not_tell_apart_have_names_of_their_own():
+    settings = orders_step.OrderSettings(
+        channels=(), steady=False, teller="n", turns_per_unit=1.0, shaft="motor", counted=True, ratios=(), orders=(),
+        curves=(), carriers=(), spacings=(), bandwidth=0.05, highest_order=2000.0, resolution_hz=8.0, vold_kalman=False,
+    )  # fmt: skip
+    names = [order.name for order in orders_step._named((17.4, 300.06, 300.12), settings)]
+    assert names == ["order 17.4", "order 300.1", "order 300.12"]

@@ -136,3 +136,13 @@ def test_the_highest_order_follows_the_speed():
     found = order_map(RUN, RUN.order(3.0), SpeedRows.even(10.0, 50.0, 8), highest=200.0, resolution=0.5)
     assert found.highest[0] == 200.0
     assert found.highest[-1] == pytest.approx(0.4 * 8192.0 / 50.0, rel=0.02)
+
+
+def test_a_map_without_errors_is_the_same_map():
+    plan, rows = plan_line_frames(100.0, 0.25), SpeedRows.even(10.0, 50.0, 5)
+    meters = [MapMeter(plan, rows, 1, "order", 40.0, RUN.rate_hz, errors=errors) for errors in (True, False)]
+    resampler = AngleResampler(ShaftAngle(*RUN.nodes()), RUN.rate_hz, 40.0, samples_per_turn=100)
+    Frames(plan, meters).take(resampler.take(RUN.noise(1e-4)[None]))
+    whole, bare = (meter.result() for meter in meters)
+    assert np.array_equal(whole.mean_square, bare.mean_square) and np.isnan(bare.error).all()
+    assert np.isfinite(whole.error).all() and bare.error.shape == whole.error.shape

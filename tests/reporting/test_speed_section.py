@@ -173,3 +173,13 @@ def test_the_section_is_a_page():
     section = speed(analysis(run("a", profile())))
     page = render_html(Document(title="t", subtitle="s", origin="measured", sections=[section]))
     assert "All speeds as a table" in page
+
+
+def test_a_shaft_that_stands_has_no_range_and_no_error():
+    made = analysis(run("a", profile(speed=np.zeros(T.size))))
+    assert sentences(speed(made)) == ["Tacho tacho tells the speed of the motor shaft in run a, which stands."]
+
+
+def test_a_backward_speed_has_a_minus_sign():
+    (said,) = sentences(speed(analysis(run("a", profile(speed=np.linspace(-10.0, 10.0, T.size))))))
+    assert "\N{MINUS SIGN}600 to 600 rpm" in said

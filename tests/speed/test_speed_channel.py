@@ -48,3 +48,17 @@ def test_any_cut_into_blocks_gives_the_same_values(cuts):
     x = np.random.default_rng(1).standard_normal(1000)
     for whole, pieces in zip(averaged(x, 777.7), averaged(x, 777.7, cuts), strict=True):
         assert np.array_equal(whole, pieces)
+
+
+def test_the_error_is_no_less_than_that_of_rounding():
+    """A straight line in steps of 0.1: its means hardly scatter, and yet lie up to half a step off."""
+    meter = SpeedChannelMeter(100.0)
+    meter.take(np.round(10.0 + 0.02 * np.arange(2000) / 100.0, 1))
+    error = meter.profile("s", None, "m/s").error
+    assert error.min() == pytest.approx(0.1 / np.sqrt(12.0), rel=1e-6)
+
+
+def test_a_channel_that_never_changes_tells_no_error():
+    meter = SpeedChannelMeter(100.0)
+    meter.take(np.full(2000, 7.3))
+    assert meter.profile("s", None, "m/s").error is None

@@ -390,3 +390,16 @@ def test_a_run_up_is_compared_with_a_coast_down(tmp_path):
     assert len(total) >= 4 and total["train_speed_km_h"].is_monotonic_increasing
     assert total["torque_share"].mean() == pytest.approx(0.5, abs=0.08)
     assert ((total["low"] <= 0.5) & (total["high"] >= 0.5)).all()
+
+
+def test_a_run_up_too_short_for_any_state_is_said(tmp_path):
+    """One second: not three segments at any speed."""
+    path, records = write_campaign(tmp_path, POWERS[:1], seconds=1.0, run_keys={"20": {"train_speed_km_h": None}})
+    path.write_text(path.read_text().replace("train_speed_km_h = null\n", ""))
+    path.write_text(path.read_text() + table("channel", name="v", quantity="speed", unit="km/h"))
+    samples = {name: (row, UNITS[name]) for name, row in zip(UNITS, records["20"].samples, strict=True)}
+    rising = np.linspace(20.0, 60.0, records["20"].samples.shape[1])
+    write_log(tmp_path / "20.h5", {**samples, "v": (rising, "km/h")})
+    analysis = analyze(path, tmp_path / "store", jobs=1)
+    (problem,) = (text for text in analysis.problems if "contributions" in text)
+    assert "run 20: it has at no speed the 3 segments that a state takes" in problem and analysis.contributions is None

@@ -1,6 +1,8 @@
 """Orders of a campaign's runs: tables, arrays, and words on what could not be had."""
 
 import dataclasses
+import shutil
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -244,3 +246,66 @@ def test_orders_of_a_fleet(tmp_path):
     assert all(np.isfinite(curve.frequencies_hz).any() for curve in curves)
     assert pd.Series([order.order for order in orders]).is_monotonic_increasing
     assert dataclasses.is_dataclass(orders[0])
+
+
+def test_an_order_that_is_to_be_tracked_is_tracked_though_nobody_else_names_it(tmp_path):
+    turns = 10.0 * T + (30.0 - 10.0) * T**2 / (2.0 * SECONDS)
+    extra = 0.05 * np.sqrt(2.0) * np.sin(2.0 * np.pi * 17.4 * turns)
+    text = "[analysis]\nvold_kalman = [17.4, 5000]\n"
+    frame = made(tmp_path, {"up": run_up(extra=extra)}, text=text).tables["orders"]
+    assert set(frame[frame["method"] == "vold_kalman"]["name"]) == {"order 17.4"}
+    (beyond,) = frame[frame["name"] == "order 5000"].to_dict("records")
+    assert "beyond order" in beyond["reason"]
+
+
+def test_a_speed_that_is_all_but_zero_is_a_standstill(tmp_path):
+    """Four seconds at 1e-5 rpm before the start: mesh harmonics below any frequency there are without number."""
+    log = run_up(0.0, 30.0)
+    speed = np.where(T < 4.0, 1e-5, log["n"][0])
+    (held,) = made(tmp_path, {"start": {**log, "n": (speed, "rpm")}}).orders.values()
+    assert held.lowest_hz >= 0.5 and len(held.orders) < 40
+
+
+def test_sensors_of_another_drive_are_named(tmp_path):
+    log = run_up()
+    log["z"] = (log["m"][0], "m/s^2")
+    second = table("channel", name="z", component="motor", drive="2", quantity="acceleration")
+    path = Made(tmp_path, mic("m", distance_m=4.0) + SPEED + second, [run_of("up", "up")], {"up": log}).campaign.path
+    path.write_text(path.read_text().replace("train_speed_km_h = 30.0\n", ""))
+    (problem,) = analyze(path, tmp_path / "store", jobs=1).problems
+    assert problem == (
+        "orders of z in run up are cut over the angle of n, a shaft of drive 1, "
+        "which need not turn as fast as their own"
+    )
+
+
+def test_a_channel_that_starts_too_late_stops_no_other(tmp_path):
+    """A second raster with a tenth of a second before the end: hardly a turn of the angle that is known."""
+    log = run_up()
+    path = Made(tmp_path, mic("m", distance_m=4.0) + SPEED, [run_of("up", "up")], {"up": log}).campaign.path
+    with h5py.File(tmp_path / "up.h5", "a") as file:
+        late = file.create_dataset("late", data=np.float32(log["m"][0][-400:]))
+        late.attrs.update({"sample_rate_hz": RATE_HZ, "unit": "Pa", "start_s": SECONDS - 400 / RATE_HZ})
+    path.write_text(path.read_text().replace("train_speed_km_h = 30.0\n", "") + mic("late"))
+    analysis = analyze(path, tmp_path / "store", jobs=1)
+    assert set(analysis.tables["orders"]["channel"]) == {"m"}
+    (late,) = (held for held in analysis.orders["up"].channels if held.channel == "late")
+    assert "no orders of late: the motor turns 1.26 times" in late.notes[0]
+    assert "No orders of late" in " ".join(
+        text for block in walk([order_section(analysis)]) if isinstance(block, Sentences) for text in block.items
+    )
+
+
+def test_a_run_up_of_one_frame_has_no_map_and_a_report(tmp_path):
+    """Frames as long as the record: nothing to draw over time, and no reason to fail."""
+    source = Path(__file__).parents[2] / "recordings" / "first-run"
+    text = (source / "campaign.toml").read_text(encoding="utf-8")
+    head, *runs = text.split("[[run]]")
+    run_up = next(run for run in runs if '"run-up"' in run)
+    shutil.copy(source / "condition-run-up.h5", tmp_path)
+    keys = "\n[analysis]\nrun_up_resolution_hz = 0.13\nfrequency_resolution_hz = 0.13\n"
+    (tmp_path / "campaign.toml").write_text(f"{head}[[run]]{run_up}{keys}", encoding="utf-8")
+    analysis = analyze(tmp_path / "campaign.toml", tmp_path / "store", jobs=1)
+    (result,) = [r for r in analysis.runs[0].measurement.channels if r.channel == "mic_left"]
+    assert result.map is not None and result.map.times_s.size == 1
+    assert measured_report(analysis).sections

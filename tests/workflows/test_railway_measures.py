@@ -19,7 +19,7 @@ from small_campaigns import HEAD, MIC, RATE_HZ, small_campaign, table, write_log
 
 from tdacoustic import analyze
 from tdacoustic.reporting.document import Sentences, Table, walk
-from tdacoustic.reporting.sections.railway import railway
+from tdacoustic.reporting.sections.railway import railway, railway_words
 from tdacoustic.workflows.output import OutputFolder
 from tdacoustic.workflows.write import write_analysis
 
@@ -44,6 +44,12 @@ def said(analysis):
 def passages(tmp_path_factory):
     settings = "\n[railway]\nstandards = ['ISO 3095:2013', 'ISO 3095:2025']\nreference_track = true\n"
     return analysed(pass_by_campaign(tmp_path_factory.mktemp("passages"), text=settings))
+
+
+def test_the_summary_names_the_results_of_a_condition(passages):
+    words = railway_words(passages, "80")
+    assert words == "pass-by LpAeq,Tp = 93 dB at left (ISO 3095:2013 and ISO 3095:2025)"
+    assert railway_words(passages, "no such condition") == ""
 
 
 def test_the_levels_of_known_passages(passages, conformance):

@@ -14,13 +14,17 @@ from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Noti
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.sections.contributions import agreement_words
 from tdacoustic.reporting.sections.order_sentences import loudest_order_words
+from tdacoustic.reporting.sections.railway import railway_words
 from tdacoustic.reporting.sections.words import (
     OWNER_SLOTS,
+    UNKNOWN_SPEED,
     condition_words,
     distinct_lines,
     is_override,
     joined,
     probability_words,
+    speed_words,
+    tested_runs,
 )
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
@@ -133,8 +137,12 @@ def _fraction_words(analysis: Analysis, verdict: Dominance) -> str:
     part = _percent(verdict.line_fraction)
     if verdict.line_fraction < MOST_OF_THE_SOUND:
         left_out = any(exclude.condition == verdict.condition for exclude in analysis.campaign.excludes)
-        rest = "broadband or left out" if left_out else "broadband"
-        return f", but the lines are only {part} of the sound energy: the rest is {rest}"
+        of_condition = [run for run in tested_runs(analysis) if run.run.condition == verdict.condition]
+        moving = any(speed_words(run) == UNKNOWN_SPEED for run in of_condition)
+        rest = "broadband" + (", or moves with a speed that is not known" if moving else "")
+        rest += " or left out" if left_out else ""
+        but = "; and" if verdict.dominant == "undecided" else ", but"
+        return f"{but} the lines are only {part} of the sound energy: the rest is {rest}"
     return f"; the lines are {part} of the sound energy"
 
 
@@ -308,4 +316,6 @@ def _level_words(analysis: Analysis, condition: str) -> str:
         return ""
     used = list(dict.fromkeys(chosen.loc[chosen["level_db"].notna() | chosen["laeq_db"].notna(), "channel"]))
     where = f"energy mean of {len(used)} microphones" if len(used) > 1 else f"at {used[0]}"
+    by_standard = railway_words(analysis, condition)
+    where += f", over the whole records; {by_standard}" if by_standard else ""
     return f"{' or '.join(words)} re 20 µPa, {where}"

@@ -7,6 +7,7 @@ from typing import Final
 from tdacoustic.attribution import CampaignContributions, ContributionState
 from tdacoustic.attribution.line_coherence import LineCoherence
 from tdacoustic.reporting.document import Block, Column, Paragraph, Section, Table
+from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.results import Analysis
 
 __all__ = ["coherence", "state_words"]
@@ -70,7 +71,8 @@ def coherence(analysis: Analysis, found: CampaignContributions, receiver: str) -
     blocks: list[Block] = [Paragraph(f"{_coherent_words(found)}{words}")]
     if rows:
         title = f"Squared coherence at the loudest lines, {receiver} (95 %)"
-        blocks.append(Table("coherence-lines", title, columns, rows, origin=analysis.campaign.origin))
+        table = Table("coherence-lines", title, columns, rows, origin=analysis.campaign.origin)
+        blocks.append(in_sight(table, "Coherence at the loudest lines"))
     return Section("coherence", "Coherence of sensors and microphones", blocks)
 
 

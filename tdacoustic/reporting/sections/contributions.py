@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Final
 
-import numpy as np
-
-from tdacoustic.attribution import CampaignContributions, ContributionState
+from tdacoustic.attribution import CampaignContributions
 from tdacoustic.attribution.contribution_spans import NamedSpan
+from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart, SpanContributions
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
-from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
 from tdacoustic.reporting.sections.coherence import coherence, state_words
-from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, joined, pretty_signs, slug
+from tdacoustic.reporting.sections.contribution_figures import (
+    Row,
+    db_words,
+    over_frequency,
+    over_speed,
+    part_words,
+)
+from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.sections.words import joined, pretty_signs, slug
 from tdacoustic.results import Analysis
 from tdacoustic.tables.contributions import power_db
 
 __all__ = ["agreement_words", "contributions"]
 
-Row = tuple[ContributionState, NamedSpan, SpanContributions]
-
 IN_SIGHT: Final = 3
 """Runs whose figures stand in sight; those of more are folded away."""
-NO_LOWER_DB: Final = 15.0
-"""Length of a bar without a lower end."""
 MOST: Final = 0.5
-SYMBOLS: Final = {"ok": "circle", "flagged": "x", "refused": "triangle", "below": "triangle"}
-WORDS: Final = {"ok": "", "flagged": ", flagged", "bound": ", at most"}
+"""Part of the sound from which on it is said that no sensor explains it."""
 
 METHOD = (
     "A contribution is the power at the microphone that moves with a component's sensors, by transfer paths of all "
@@ -35,7 +36,8 @@ METHOD = (
     "sources to tell it. Known: cross-talk leaves less than 3 dB open. Flagged: more, so the level is what the sensors "
     "explain, cross-talk included, and its range is that of the readings, no confidence interval. Refused: next to "
     "nothing of it is its own; only the upper bound says something. Intervals are of 95 %. What is loud and has no "
-    "sensor is found under no component: it is what no sensor explains, or hides in those whose sensors feel it too."
+    "sensor is found under no component: it is what no sensor explains, or hides in those whose sensors feel it too; "
+    "where the paths differ from state to state it is not known, and contributions.csv holds an upper bound."
 )
 
 
@@ -66,16 +68,17 @@ def _of_receiver(
     """Tables and figures of one microphone; those over frequency where they are asked for."""
     held = [row for row in rows if row[2].receiver == receiver]
     origin = analysis.campaign.origin
-    over_speed = [FigureBlock(figure, origin) for figure in _over_speed(found, held, receiver)]
-    drawn = [FigureBlock(figure, origin) for figure in _over_frequency(found, held, receiver)] if figures else []
-    blocks: list[Block] = [*over_speed]
+    modes = {run.name: run.run.mode or "" for run in analysis.runs}
+    drawn = [FigureBlock(figure, origin) for figure in over_frequency(found, held, receiver)] if figures else []
+    blocks: list[Block] = [FigureBlock(figure, origin) for figure in over_speed(found, held, receiver, modes)]
     if len(drawn) <= IN_SIGHT:
         blocks += drawn
     else:
         blocks.append(Details(f"Contributions over frequency, {len(drawn)} operating states", drawn))
     whole = [row for row in held if row[1].kind in ("total", "tones", "broadband")]
     single = [row for row in held if row[1].kind in ("order", "tone")]
-    blocks.append(_table(analysis, found, whole, slug("contributions", receiver), f"Contributions at {receiver}"))
+    table = _table(analysis, found, whole, slug("contributions", receiver), f"Contributions at {receiver}")
+    blocks.append(in_sight(table, f"Contributions at {receiver} as a table"))
     if single:
         title = f"Contributions at {receiver}, tone by tone"
         table = _table(analysis, found, single, slug("contributions-of-tones", receiver), title)
@@ -84,24 +87,6 @@ def _of_receiver(
 
 
 # ---------------------------------------------------------------- words
-
-
-def _db(mean_square: float | None) -> str:
-    level = power_db(mean_square)
-    return "no power" if level is None else f"{level:.1f} dB"
-
-
-def _range(part: GroupPart) -> str:
-    low, high = power_db(part.low), power_db(part.high)
-    if high is None:
-        return ""
-    return f"at most {high:.1f}" if low is None else f"{low:.1f} to {high:.1f}"
-
-
-def _part_words(name: str, part: GroupPart) -> str:
-    if part.verdict in ("refused", "below"):
-        return f"{name} {'refused, ' if part.verdict == 'refused' else ''}at most {_db(part.high)}"
-    return f"{name} {_db(part.mean_square)} ({'flagged, ' if part.verdict == 'flagged' else ''}{_range(part)})"
 
 
 def _answer(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row], receiver: str) -> list[Block]:
@@ -115,7 +100,8 @@ def _answer(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row
     words = f"At {receiver}, by the paths of {len(found.states)} operating states together"
     if len(found.states) == 1:
         words = f"At {receiver}, from a single operating state, which cannot tell cross-talk from a source"
-    return [Paragraph(f"{words}:"), Sentences(sentences)]
+    low, high = next(parts.band_hz for _, span, parts in rows if span.kind == "total" and parts.receiver == receiver)
+    return [Paragraph(f"{words}, {low:.4g} to {high:.4g} Hz:"), Sentences(sentences)]
 
 
 def _sentence(held: Sequence[Row], several: bool) -> str:
@@ -128,17 +114,20 @@ def _sentence(held: Sequence[Row], several: bool) -> str:
     total, tones = by_kind["total"], by_kind.get("tones")
     said = f"{what}{speed}: "
     if tones is not None:
-        told = joined([_part_words(name, part) for name, part in tones.groups.items()])
-        said += f"of the tones' {_db(tones.total)}: {told}; {_unexplained(tones)}. Of all {_db(total.total)} "
+        told = joined([part_words(name, part) for name, part in tones.groups.items()])
+        said += f"of the tones' {db_words(tones.total)}: {told}; {_unexplained(tones)}. "
+        said += f"Of all {db_words(total.total)} "
     else:
-        told = joined([_part_words(name, part) for name, part in total.groups.items()])
-        said += f"of {_db(total.total)}: {told}; "
+        told = joined([part_words(name, part) for name, part in total.groups.items()])
+        said += f"of {db_words(total.total)}: {told}; "
     return said + f"{_unexplained(total)}."
 
 
 def _unexplained(parts: SpanContributions) -> str:
+    if paths_changed(parts):
+        return "the paths differ from state to state, so what no sensor explains is not known"
     share = 100.0 * parts.residual / parts.total if parts.total > 0.0 else 0.0
-    return f"no sensor explains {_db(parts.residual)}" + (f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else "")
+    return f"no sensor explains {db_words(parts.residual)}" + (f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else "")
 
 
 def _run_up_words(held: Sequence[Row]) -> str:
@@ -153,8 +142,11 @@ def _run_up_words(held: Sequence[Row]) -> str:
             said.append(f"{name} {min(known):.1f} to {max(known):.1f} dB, known at {len(known)} of {len(rows)} speeds")
     known_any = bool(said)
     said = said or [f"no component's part is known at any of {len(rows)} speeds"]
-    most = sum(p.residual > MOST * p.total for _, p in rows)
+    most = sum(p.residual > MOST * p.total and not paths_changed(p) for _, p in rows)
     end = f"; most of the sound is explained by no sensor at {most} of them" if most else ""
+    differ = sum(paths_changed(p) for _, p in rows)
+    if differ:
+        end += f"; what no sensor explains is not known at {differ}, for the paths differ from state to state"
     ends = f" from {speeds[0].split()[0]} to {speeds[-1]}" if speeds else ""
     return f"a run-up{ends}: {'of the whole sound ' if known_any else ''}{joined(said)}{end}."
 
@@ -185,134 +177,6 @@ def agreement_words(analysis: Analysis, condition: str) -> str:
     return f"{opening.get(found.agreement.word, 'One kind of evidence alone')}: {'; '.join(said)}."
 
 
-# ---------------------------------------------------------------- figures
-
-
-def _slot(found: CampaignContributions, name: str) -> int:
-    others = [component for component in found.components if component not in OWNER_SLOTS]
-    return OWNER_SLOTS[name] if name in OWNER_SLOTS else (OWNER_SLOT_OTHER, 4, 5, 6)[others.index(name) % 4]
-
-
-def _elements(
-    found: CampaignContributions, x: Sequence[float], rows: Sequence[SpanContributions], logarithmic: bool
-) -> list[Element]:
-    """Parts of some spans: what was measured, what no sensor explains, and each component by its verdict."""
-    at = np.array(x)
-    total = np.array([power_db(parts.total) for parts in rows], dtype=np.float64)
-    rest = np.array([power_db(parts.residual) for parts in rows], dtype=np.float64)
-    style = {"points": True} if len(x) <= 12 else {}
-    elements: list[Element] = [
-        Line(at, total, "measured", color=7, **style),  # type: ignore[arg-type]
-        Line(at, rest, "explained by no sensor", style="dashed", color=3, **style),  # type: ignore[arg-type]
-    ]
-    names = found.components
-    span = float(at.max() - at.min()) if at.size > 1 else 1.0
-    for number, name in enumerate(names):
-        step = number - 0.5 * (len(names) - 1)
-        place = at * 1.025**step if logarithmic else at + 0.012 * span * step
-        elements += _part_elements(name, place, [parts.groups[name] for parts in rows], _slot(found, name))
-    return elements
-
-
-def _part_elements(name: str, x: np.ndarray, parts: Sequence[GroupPart], slot: int) -> list[Element]:
-    found: list[Element] = []
-    bars_x: list[float] = []
-    bars_y: list[float] = []
-    groups: dict[str, list[tuple[float, float, str]]] = {}
-    for place, part in zip(x, parts, strict=True):
-        bound = part.verdict in ("refused", "below")
-        level = power_db(part.high if bound else part.mean_square)
-        if level is None:
-            continue
-        words = f"{name}: {_part_words('', part).strip()}"
-        groups.setdefault("bound" if bound else part.verdict, []).append((float(place), level, words))
-        high, low = power_db(part.high), power_db(part.low)
-        if not bound and high is not None:
-            bars_x += [float(place)] * 3
-            bars_y += [level - NO_LOWER_DB if low is None else low, high, np.nan]
-    if bars_x:
-        found.append(Line(np.array(bars_x), np.array(bars_y), f"{name}: range", color=slot, opacity=0.5, group="range"))
-    for kind, points in groups.items():
-        found.append(
-            Markers(
-                np.array([p[0] for p in points]),
-                np.array([p[1] for p in points]),
-                f"{name}{WORDS[kind]}",
-                texts=tuple(p[2] for p in points),
-                symbol=SYMBOLS.get(kind, "triangle"),  # type: ignore[arg-type]
-                color=slot,
-            )
-        )
-    return found
-
-
-def _limits(elements: Iterable[Element]) -> tuple[float, float]:
-    """From a little below the lowest point to a little above the highest; bars may run out of it."""
-    levels = [e.y for e in elements if isinstance(e, Markers)]
-    levels += [e.y for e in elements if isinstance(e, Line) and not e.name.endswith("range")]
-    values = np.concatenate(levels)
-    values = values[np.isfinite(values)]
-    return (float(values.min()) - 4.0, float(values.max()) + 3.0) if values.size else (0.0, 1.0)
-
-
-DRAWN = (
-    "A dot is known, a cross flagged, a triangle an upper bound of what is refused or does not stand above its "
-    "scatter; the bars are the ranges of the table, and those without a lower end are drawn 15 dB down."
-)
-
-
-def _over_frequency(found: CampaignContributions, held: Sequence[Row], receiver: str) -> list[Figure]:
-    """One figure an operating state: parts in third octaves."""
-    figures = []
-    for state in found.states:
-        rows = [(span, parts) for s, span, parts in held if s.name == state.name and span.kind == "band"]
-        if len(rows) < 2:
-            continue
-        centres = [float(np.sqrt(parts.band_hz[0] * parts.band_hz[1])) for _, parts in rows]
-        elements = _elements(found, centres, [parts for _, parts in rows], logarithmic=True)
-        speed = f", {state_words(state)}" if state_words(state) else ""
-        figures.append(
-            Figure(
-                slug("contributions", receiver, state.name, state.run),
-                f"Contributions at {receiver}, run {state.run}{speed}",
-                f"In third octaves. {DRAWN}",
-                Axis("Frequency", "Hz", "log"),
-                Axis("Sound pressure level", "dB", reference="20 µPa", limits=_limits(elements)),
-                elements,
-                height=360,
-            )
-        )
-    return figures
-
-
-def _over_speed(found: CampaignContributions, held: Sequence[Row], receiver: str) -> list[Figure]:
-    """Parts of the tones, and of the whole, over speed."""
-    figures = []
-    speeds = {state.name: state.train_speed_km_h for state in found.states}
-    label, unit = "Train speed", "km/h"
-    if any(speed is None for speed in speeds.values()):
-        speeds = {state.name: None if state.motor_hz is None else 60.0 * state.motor_hz for state in found.states}
-        label, unit = "Motor speed", "rpm"
-    for kind, what in (("tones", "the tones"), ("total", "the whole sound")):
-        rows = [(speed, p) for s, span, p in held if span.kind == kind and (speed := speeds[s.name]) is not None]
-        rows.sort(key=lambda row: row[0])
-        if len({speed for speed, _ in rows}) < 2:
-            continue
-        elements = _elements(found, [speed for speed, _ in rows], [parts for _, parts in rows], logarithmic=False)
-        figures.append(
-            Figure(
-                slug(f"contributions-over-speed-{kind}", receiver),
-                f"Contributions to {what} over speed at {receiver}",
-                DRAWN,
-                Axis(label, unit),
-                Axis("Sound pressure level", "dB", reference="20 µPa", limits=_limits(elements)),
-                elements,
-                height=340,
-            )
-        )
-    return figures
-
-
 # ---------------------------------------------------------------- tables
 
 
@@ -331,7 +195,7 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
             state_words(state),
             _span_words(span),
             power_db(parts.total),
-            power_db(parts.residual),
+            None if paths_changed(parts) else power_db(parts.residual),
             *(_cell(parts.groups[component]) for component in found.components),
         ]
         for state, span, parts in rows

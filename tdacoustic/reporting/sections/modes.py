@@ -21,6 +21,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.reporting.sections.words import joined, slug
 from tdacoustic.results import Analysis
 from tdacoustic.tables.contributions import power_db
@@ -28,6 +29,13 @@ from tdacoustic.tables.contributions import power_db
 __all__ = ["modes"]
 
 IN_SIGHT: Final = 4
+"""Speeds whose sentences and figures stand in sight."""
+NAMED_BANDS: Final = 4
+VERDICTS: Final = {
+    "torque": "most of it depends on the torque",
+    "speed": "most of it is there without torque",
+    "undecided": "not decided",
+}
 METHOD = (
     "At one speed wheel and rail, fans on the shaft and windage go on while the drive coasts; the motor's forces, the "
     "inverter and the load of the teeth do not. What traction or braking adds to coasting is the part of the torque. "
@@ -44,12 +52,14 @@ def modes(analysis: Analysis) -> Section | None:
         return Section("modes", "What comes and goes with the torque", [Notice("info", text)])
     compared = [item for item in analysis.modes if item.comparison is not None]
     first = analysis.modes[0].channel
-    blocks: list[Block] = [Sentences([_sentence(item) for item in analysis.modes if item.channel == first])]
+    blocks: list[Block] = _answer([item for item in analysis.modes if item.channel == first])
     figures: list[Block] = [
         FigureBlock(_figure(item), analysis.campaign.origin) for item in compared if item.channel == first
     ]
     blocks += figures if len(figures) <= IN_SIGHT else [Details(f"Bands at {len(figures)} speeds", figures)]
-    blocks.append(_table(analysis, compared))
+    blocks.append(in_sight(_table(analysis, compared, of_bands=False), "All bands together"))
+    of_bands = _table(analysis, compared, of_bands=True)
+    blocks.append(Details(f"Band by band, {len(of_bands.rows)} rows", [of_bands]))
     doubts = list(dict.fromkeys(d for item in compared if item.comparison is not None for d in item.comparison.doubts))
     blocks += [Sentences([f"{doubt[0].upper()}{doubt[1:]}." for doubt in doubts])] if doubts else []
     return Section("modes", "What comes and goes with the torque", [*blocks, Paragraph(METHOD)])
@@ -57,6 +67,48 @@ def modes(analysis: Analysis) -> Section | None:
 
 def _speed_words(item: SpeedModes) -> str:
     return f"{item.speed:.3g} km/h" if item.unit == "km/h" else f"motor {60.0 * item.speed:.4g} rpm"
+
+
+def _answer(items: Sequence[SpeedModes]) -> list[Block]:
+    """A sentence a speed, those of run-ups, which are many and short, folded away."""
+    sentences = [_sentence(item) for item in items]
+    if len(sentences) <= IN_SIGHT:
+        return [Sentences(sentences)]
+    said = [sentence for mode in _modes(items) for sentence in _over_speeds(items, mode)]
+    return [Sentences(said), Details(f"Speed by speed, {len(sentences)} sentences", [Sentences(sentences)])]
+
+
+def _modes(items: Sequence[SpeedModes]) -> list[str]:
+    return list(dict.fromkeys(part.mode for item in items if item.comparison for part in item.comparison.parts))
+
+
+def _over_speeds(items: Sequence[SpeedModes], mode: str) -> list[str]:
+    """One mode over all speeds: what its whole sound depends on, and which bands."""
+    held = [(item, _of_mode(item, mode)) for item in items if _of_mode(item, mode)]
+    found: dict[str, list[tuple[SpeedModes, ModePart]]] = {}
+    for item, parts in held:
+        for part in _totals(parts):
+            found.setdefault(part.depends_on, []).append((item, part))
+    said = []
+    for depends_on, group in found.items():
+        shares = [part.torque_share for _, part in group]
+        ends = [_speed_words(item) for item, _ in (group[0], group[-1])]
+        where = f"at {ends[0]}" if len(group) == 1 else f"at {len(group)} speeds, {ends[0]} to {ends[1]}"
+        share = " to ".join(dict.fromkeys(f"{100.0 * end:.0f}" for end in (min(shares), max(shares))))
+        verdict = VERDICTS.get(depends_on, depends_on)
+        said.append(f"{mode} at {held[0][0].channel}, {where}: {verdict}, {share} % of the sound comes with the torque")
+    bands: dict[str, int] = {}
+    for _, parts in held:
+        for part in parts:
+            if part.band != "total" and part.depends_on == "torque":
+                bands[part.band] = bands.get(part.band, 0) + 1
+    often = [f"{band} at {count}" for band, count in sorted(bands.items(), key=lambda entry: -entry[1])[:NAMED_BANDS]]
+    end = f"; most of the band comes with it in {joined(often)} of {len(held)} speeds" if often else ""
+    return [f"{text[0].upper()}{text[1:]}{end if n == 0 else ''}." for n, text in enumerate(said)]
+
+
+def _of_mode(item: SpeedModes, mode: str) -> list[ModePart]:
+    return [] if item.comparison is None else [part for part in item.comparison.parts if part.mode == mode]
 
 
 def _sentence(item: SpeedModes) -> str:
@@ -67,7 +119,9 @@ def _sentence(item: SpeedModes) -> str:
     for part in _totals(item.comparison.parts):
         loaded, free = power_db(part.mean_square), power_db(part.speed_part)
         levels = "" if loaded is None or free is None else f"{loaded:.1f} dB against {free:.1f} dB without torque; "
-        said.append(f"{part.mode} {levels}{part.words}")
+        own = [p.band for p in _of_mode(item, part.mode) if p.band != "total" and p.depends_on == "torque"]
+        bands = f"; most of it in the band{'s' if len(own) > 1 else ''} {joined(own)}" if own else ""
+        said.append(f"{part.mode} {levels}{part.words}{bands}")
     return f"{held}: {'. '.join(f'{text[0].upper()}{text[1:]}' if n else text for n, text in enumerate(said))}."
 
 
@@ -108,7 +162,7 @@ def _limits(bars: Sequence[Bars]) -> tuple[float, float]:
     return (float(values.min()) - 6.0, float(values.max()) + 3.0) if values.size else (0.0, 1.0)
 
 
-def _table(analysis: Analysis, compared: Sequence[SpeedModes]) -> Table:
+def _table(analysis: Analysis, compared: Sequence[SpeedModes], of_bands: bool) -> Table:
     columns = (
         Column("speed", "Speed", align="right"),
         Column("channel", "Microphone"),
@@ -123,7 +177,9 @@ def _table(analysis: Analysis, compared: Sequence[SpeedModes]) -> Table:
     rows = []
     for item in compared:
         assert item.comparison is not None
-        for part in sorted(item.comparison.parts, key=lambda part: part.band != "total"):
+        for part in item.comparison.parts:
+            if (part.band != "total") != of_bands:
+                continue
             rows.append(
                 (
                     _speed_words(item),
@@ -137,5 +193,5 @@ def _table(analysis: Analysis, compared: Sequence[SpeedModes]) -> Table:
                     part.depends_on,
                 )
             )
-    title = "What comes and goes with the torque (levels re 20 µPa)"
-    return Table("modes", title, columns, rows, origin=analysis.campaign.origin)
+    title = f"What comes and goes with the torque{', band by band' if of_bands else ''} (levels re 20 µPa)"
+    return Table("modes-of-bands" if of_bands else "modes", title, columns, rows, origin=analysis.campaign.origin)

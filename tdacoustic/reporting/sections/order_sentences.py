@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tdacoustic.measured.order_results import ChannelOrders, RunOrders
 from tdacoustic.measured.runs import MeasuredRun
@@ -22,6 +23,9 @@ __all__ = ["fixed_sentences", "leader_sentences", "loudest_order_words"]
 SAME_LINE: Final = 0.012
 """Relative distance within which a line that is fixed in Hz is taken for a named one: a carrier is a percent off."""
 
+AHEAD_DB: Final = 1.0
+"""By how much one order has to exceed another that led before, to lead from there on: the errors of two cuts."""
+
 
 def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
     """Which order is the strongest over which speeds."""
@@ -30,14 +34,15 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
         return [f"{channel.name}: no order stands 6 dB over its floor anywhere."]
     size = max(item.speeds_hz.size for item in leading)
     whole = [item for item in leading if item.speeds_hz.size == size]  # of the reference shaft: the same classes
-    power = np.array([np.where(item.usable & ~item.disturbed, item.mean_square, 0.0) for item in whole])
-    first = np.where(power.max(axis=0) > 0.0, np.argmax(power, axis=0), -1)
+    usable = np.array([np.where(item.usable, item.mean_square, 0.0) for item in whole])
+    power = np.where([item.disturbed for item in whole], 0.0, usable)
     rpm = 60.0 * whole[0].speeds_hz
-    spans: list[tuple[int, int, int]] = []
+    first = _leaders(usable, power)
+    spans: list[tuple[int, int, int]] = []  # of a leader from class to class; classes without one are passed over
     for index, leader in enumerate(first.tolist()):
-        if spans and spans[-1][0] == leader:
+        if leader >= 0 and spans and spans[-1][0] == leader:
             spans[-1] = (leader, spans[-1][1], index)
-        else:
+        elif leader >= 0:
             spans.append((leader, index, index))
     sentences = []
     counts = {leader: int(np.sum(first == leader)) for leader in set(first.tolist()) if leader >= 0}
@@ -53,6 +58,22 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
     return sentences
 
 
+def _leaders(usable: NDArray[np.float64], power: NDArray[np.float64]) -> NDArray[np.int_]:
+    """Which order leads in each class; -1 of none, or where the strongest has another line in its band.
+
+    One that leads goes on leading as long as no other is `AHEAD_DB` stronger.
+    """
+    found = np.full(usable.shape[1], -1)
+    for index in range(found.size):
+        top = int(np.argmax(usable[:, index]))
+        if power[top, index] <= 0.0:
+            continue
+        before = found[index - 1] if index else -1
+        ahead = before < 0 or power[top, index] > 10.0 ** (AHEAD_DB / 10.0) * power[before, index]
+        found[index] = top if ahead else before
+    return found
+
+
 def _range_words(low: float, high: float) -> str:
     return f"at {low:.0f} rpm" if low == high else f"from {low:.0f} to {high:.0f} rpm"
 
@@ -60,16 +81,19 @@ def _range_words(low: float, high: float) -> str:
 def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list[str]:
     """Resonances that are passed, and lines that stay in Hz, each with the channels that show it."""
     groups: list[tuple[FixedFrequency, list[str]]] = []
-    for held in channels:
-        for item in held.fixed:
-            if item.kind == "resonance" and item not in sure_resonances(held):
-                continue
-            for other, names in groups:
-                if other.kind == item.kind and abs(other.frequency_hz / item.frequency_hz - 1.0) < SAME_LINE:
-                    names.append(held.channel)
-                    break
-            else:
-                groups.append((item, [held.channel]))
+    told = [
+        (item, held.channel)
+        for held in channels
+        for item in held.fixed
+        if item.kind != "resonance" or item in sure_resonances(held)
+    ]
+    for item, channel in sorted(told, key=lambda pair: -pair[0].confidence):  # the surest one's figures are told
+        for other, names in groups:
+            if other.kind == item.kind and abs(other.frequency_hz / item.frequency_hz - 1.0) < SAME_LINE:
+                names.append(channel)
+                break
+        else:
+            groups.append((item, [channel]))
     sentences = []
     for item, names in sorted(groups, key=lambda group: group[0].frequency_hz):
         if item.kind == "resonance":
@@ -80,8 +104,8 @@ def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list
             ]
             width = f", {item.loss_factor * item.frequency_hz:.0f} Hz wide at most" if item.loss_factor > 0 else ""
             sentences.append(
-                f"A resonance at {item.frequency_hz:.0f} Hz{width} raises what passes it by {item.rise_db:.0f} dB in "
-                f"{joined(names)}: {joined(passing[:4])}{' and others' if len(passing) > 4 else ''}."
+                f"A resonance near {item.frequency_hz:.0f} Hz{width} raises what passes it by {item.rise_db:.0f} dB in "
+                f"{_surest(names)}: {joined(passing[:4])}{' and others' if len(passing) > 4 else ''}."
             )
         else:
             own = _curve_name(found, item.frequency_hz)
@@ -90,6 +114,11 @@ def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list
                 f"changes, in {joined(names)}: it is no order of the shaft."
             )
     return sentences
+
+
+def _surest(names: Sequence[str]) -> str:
+    """The channel that the figures are of, and the others that show the same."""
+    return names[0] + (f" (seen in {joined(names[1:])} too)" if len(names) > 1 else "")
 
 
 def _curve_name(found: RunOrders, frequency_hz: float) -> str:
@@ -118,4 +147,4 @@ def loudest_order_words(analysis: Analysis, run: MeasuredRun, microphones: Seque
             name = order_words(item.order.name, item.order.order)
             rpm = 60.0 * item.speeds_hz[top]
             loudest = (level, f"{name}, up to {level:.1f} dB at {rpm:.0f} rpm at {held.channel}")
-    return "" if loudest is None else f"strongest order {loudest[1]}"
+    return "" if loudest is None else f"strongest order: {loudest[1]}"

@@ -13,13 +13,9 @@ from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Figure
-from tdacoustic.reporting.sections.order_figures import (
-    average_figure,
-    cut_figure,
-    frequency_figure,
-    order_figure,
-    shaft_words,
-)
+from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.sections.order_figures import average_figure, cut_figure, shaft_words
+from tdacoustic.reporting.sections.order_maps import frequency_figure, order_figure
 from tdacoustic.reporting.sections.order_sentences import fixed_sentences, leader_sentences
 from tdacoustic.reporting.sections.words import joined, pretty_signs, slug, speed_words
 from tdacoustic.results import Analysis
@@ -32,8 +28,13 @@ __all__ = ["orders"]
 
 SHOWN: Final = 2
 """Receivers whose maps are open; those of other channels are folded away."""
-MOST_FOLDED: Final = 10
-"""Further channels of a run that have figures."""
+MOST_MAPS: Final = 24
+"""Channels of all run-ups together that have maps, receivers first: a map is up to half a megabyte of the report."""
+
+MOST_FAMILIES: Final = 4
+"""Families of sidebands that a sentence names."""
+FAINT_DB: Final = -20.0
+"""Sidebands below this against their carrier add less than 0.05 dB to it."""
 
 
 def orders(analysis: Analysis) -> Section | None:
@@ -43,9 +44,9 @@ def orders(analysis: Analysis) -> Section | None:
         return None
     microphones = receivers(analysis.runs)
     blocks: list[Block] = []
-    for run, found in held:
-        if not found.steady:
-            blocks.append(_run_up(analysis, run, found, microphones))
+    run_ups = [(run, found) for run, found in held if not found.steady]
+    for run, found in run_ups:
+        blocks.append(_run_up(analysis, run, found, microphones, max(SHOWN, MOST_MAPS // len(run_ups))))
     steady = [(run, found) for run, found in held if found.steady]
     if steady:
         blocks.append(_steady(analysis, steady, microphones))
@@ -77,7 +78,8 @@ def _channels(run: MeasuredRun, found: RunOrders) -> Iterator[tuple[Channel, Cha
 # ------------------------------------------------------------ run-ups
 
 
-def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones: Sequence[str]) -> Section:
+def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones: Sequence[str], most: int) -> Section:
+    """A run-up: its sentences, the maps and cuts of `most` channels, and what stays in Hz."""
     channels = sorted(_channels(run, found), key=lambda item: item[0].name not in microphones)
     sentences = [
         sentence
@@ -93,18 +95,18 @@ def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones:
     if not open_ones and channels:
         open_ones = [channels[0][0].name]
     origin = analysis.campaign.origin
-    folded = 0
-    for channel, held in channels:
+    drawn = [item for item in channels if item[0].name in open_ones]
+    drawn += [item for item in channels if item[0].name not in open_ones][: max(0, most - len(drawn))]
+    for channel, held in drawn:
         figures = [frequency_figure(run.name, found, channel, held), cut_figure(run.name, found, channel, held)]
         if channel.name in open_ones:
             figures.insert(1, order_figure(run.name, found, channel, held))
         shown = [FigureBlock(figure, origin) for figure in figures if isinstance(figure, Figure)]
         if channel.name in open_ones:
             blocks += shown
-        elif folded < MOST_FOLDED and shown:
-            folded += 1
+        elif shown:
             blocks.append(Details(f"{channel.name}: map and orders over speed", shown))
-    left = len(channels) - len(open_ones) - folded
+    left = len(channels) - len(drawn)
     if left > 0:
         blocks.append(Paragraph(f"Maps and orders of {left} more channels are in result.h5 and orders.csv."))
     blocks += _fixed_table(analysis, run)
@@ -137,7 +139,7 @@ def _fixed_table(analysis: Analysis, run: MeasuredRun) -> list[Block]:
         f"What stays at its frequency while the speed changes, run {run.name}. A resonance raises orders that pass "
         "it; a line is there by itself at each class of speed. The width is an upper bound: the sweep broadens it."
     )
-    return [Table(name, caption, columns, _cells(held, columns))]
+    return [in_sight(Table(name, caption, columns, _cells(held, columns)), "What stays at its frequency")]
 
 
 # ------------------------------------------------------------ steady runs
@@ -222,11 +224,27 @@ def _sidebands(analysis: Analysis) -> list[Block]:
         Column("phase_depth_rad", "Phase modulation", "rad", 3, "number"),
         Column("reason", "Remark"),
     )
-    spacings = joined(list(dict.fromkeys(held["spacing"])))
-    words = f"Sidebands spaced by the {spacings} stand out beside {joined(list(dict.fromkeys(held['carrier']))[:6])}."
     rows = _cells(held, columns)
     name = "Pairs of sidebands that stand 6 dB over the floor on both sides"
-    return [Paragraph(words), Details(f"{len(rows)} families of sidebands", [Table("sidebands", name, columns, rows)])]
+    folded = Details(f"Sidebands over speed, {len(rows)} rows", [Table("sidebands", name, columns, rows)])
+    return [Paragraph(_sideband_words(held)), folded]
+
+
+def _sideband_words(held: pd.DataFrame) -> str:
+    """Which sidebands stand out, how strong they are where, and how often their phases say which modulation it is."""
+    said = []
+    for (carrier, spacing), family in list(held.groupby(["carrier", "spacing"], sort=False))[:MOST_FAMILIES]:
+        strongest = family.loc[family["sidebands_db"].idxmax()]
+        steady = int((~family["reason"].fillna("").str.contains("unsteady")).sum())
+        said.append(
+            f"of {carrier}, spaced by the {spacing}, up to {strongest['sidebands_db']:.1f} dB against the carrier "
+            f"({strongest['channel']}, {strongest['speed_rpm']:.0f} rpm), with steady phases in {steady} of "
+            f"{len(family)} findings"
+        )
+    faint = ""
+    if held["sidebands_db"].max() < FAINT_DB:
+        faint = f" All are more than {-FAINT_DB:.0f} dB below their carrier: too faint to matter to the sound."
+    return pretty_signs(f"Sidebands stand out {'; '.join(said)}.{faint}")
 
 
 def _cells(held: pd.DataFrame, columns: Sequence[Column]) -> list[list[Any]]:

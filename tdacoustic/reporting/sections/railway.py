@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -29,11 +29,13 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
+from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, slug
 from tdacoustic.results import Analysis
 from tdacoustic.units import REFERENCES
 
-__all__ = ["railway"]
+__all__ = ["railway", "railway_words"]
 
 SHOWN_FIGURES = 2
 """Histories drawn openly; further ones are folded away."""
@@ -59,13 +61,31 @@ def railway(analysis: Analysis) -> Section | None:
     if figures[SHOWN_FIGURES:]:
         blocks.append(Details("Levels over time of the other tests", figures[SHOWN_FIGURES:]))
     if found.positions:
-        blocks.append(_repetition_table(analysis, found.positions))
+        blocks.append(in_sight(_repetition_table(analysis, found.positions), "Repetition by microphone"))
     if found.quantities:
-        blocks.append(_quantity_table(analysis, found.quantities))
+        blocks.append(in_sight(_quantity_table(analysis, found.quantities), "Quantities of each run"))
         findings = _findings_table(found.quantities)
         if findings is not None:
             blocks.append(Details("The requirements one by one", [findings]))
     return Section("railway", "By the railway standards", blocks)
+
+
+def railway_words(analysis: Analysis, condition: str) -> str:
+    """Return the results of a condition by the standards in a few words; empty where there is none.
+
+    Parameters
+    ----------
+    analysis : Analysis
+    condition : str
+    """
+    if analysis.railway is None:
+        return ""
+    said: dict[str, list[str]] = {}
+    for item in analysis.railway.positions:
+        if item.condition == condition and item.decisive and item.repetition.reported_db is not None:
+            words = f"{item.test} {item.symbol} = {item.repetition.reported_db} dB at {item.channel}"
+            said.setdefault(words, []).append(item.standard)
+    return "; ".join(f"{words} ({joined(standards)})" for words, standards in said.items())
 
 
 def _intro(found: RailwayMeasures) -> str:
@@ -225,67 +245,36 @@ def _line(item: RunQuantity, hearing: Hearing | None, zero_s: float) -> Line | N
 
 
 def _repetition_table(analysis: Analysis, positions: Sequence[PositionResult]) -> Table:
-    columns = (
-        Column("condition", "Condition"),
-        Column("standard", "Standard"),
-        Column("test", "Test"),
-        Column("channel", "Microphone"),
-        Column("symbol", "Quantity"),
-        Column("n_runs", "Runs", "", 0, "number"),
-        Column("mean_db", "Mean", "dB", 1, "number"),
-        Column("spread_db", "Spread", "dB", 1, "number"),
-        Column("reported_db", "Result", "dB", 0, "number"),
-        Column("state", "Requirements"),
-        Column("reason", "Why no result"),
-    )
-    rows: list[list[Cell]] = [
-        [
-            p.condition,
-            p.standard,
-            p.test,
-            p.channel + (" (decisive)" if p.decisive else ""),
-            p.symbol,
-            len(p.repetition.levels_db),
-            p.repetition.mean_db,
-            p.repetition.spread_db,
-            p.repetition.reported_db,
-            p.state,
-            p.repetition.reason or "",
-        ]
-        for p in positions
+    columns: list[tuple[Column, Callable[[PositionResult], Cell]]] = [
+        (Column("condition", "Condition"), lambda p: p.condition),
+        (Column("standard", "Standard"), lambda p: p.standard),
+        (Column("test", "Test"), lambda p: p.test),
+        (Column("channel", "Microphone"), lambda p: p.channel + (" (decisive)" if p.decisive else "")),
+        (Column("symbol", "Quantity"), lambda p: p.symbol),
+        (Column("n_runs", "Runs", "", 0, "number"), lambda p: len(p.repetition.levels_db)),
+        (Column("mean_db", "Mean", "dB", 1, "number"), lambda p: p.repetition.mean_db),
+        (Column("spread_db", "Spread", "dB", 1, "number"), lambda p: p.repetition.spread_db),
+        (Column("reported_db", "Result", "dB", 0, "number"), lambda p: p.repetition.reported_db),
+        (Column("state", "Requirements"), lambda p: p.state),
+        (Column("reason", "Why no result"), lambda p: p.repetition.reason or ""),
     ]
-    return Table("railway-repetition", "Repetition", columns, rows, origin=analysis.campaign.origin)
+    return item_table("railway-repetition", "Repetition", positions, columns, analysis.campaign.origin)
 
 
 def _quantity_table(analysis: Analysis, quantities: Sequence[RunQuantity]) -> Table:
-    columns = (
-        Column("run", "Run"),
-        Column("channel", "Microphone"),
-        Column("standard", "Standard"),
-        Column("test", "Test"),
-        Column("symbol", "Quantity"),
-        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
-        Column("corrected_db", "Less background", "dB", 1, "number"),
-        Column("span", "Interval"),
-        Column("state", "Requirements"),
-        Column("reason", "Why no level"),
-    )
-    rows: list[list[Cell]] = [
-        [
-            item.run,
-            item.channel,
-            item.quantity.standard,
-            item.quantity.test,
-            item.quantity.symbol,
-            item.quantity.level_db,
-            item.quantity.corrected_db,
-            _span(item.quantity),
-            item.quantity.state,
-            item.quantity.reason or "",
-        ]
-        for item in quantities
+    columns: list[tuple[Column, Callable[[RunQuantity], Cell]]] = [
+        (Column("run", "Run"), lambda item: item.run),
+        (Column("channel", "Microphone"), lambda item: item.channel),
+        (Column("standard", "Standard"), lambda item: item.quantity.standard),
+        (Column("test", "Test"), lambda item: item.quantity.test),
+        (Column("symbol", "Quantity"), lambda item: item.quantity.symbol),
+        (Column("level_db", "Level", "dB re 20 µPa", 1, "number"), lambda item: item.quantity.level_db),
+        (Column("corrected_db", "Less background", "dB", 1, "number"), lambda item: item.quantity.corrected_db),
+        (Column("span", "Interval"), lambda item: _span(item.quantity)),
+        (Column("state", "Requirements"), lambda item: item.quantity.state),
+        (Column("reason", "Why no level"), lambda item: item.quantity.reason or ""),
     ]
-    return Table("railway", "Quantities of each run", columns, rows, origin=analysis.campaign.origin)
+    return item_table("railway", "Quantities of each run", quantities, columns, analysis.campaign.origin)
 
 
 def _span(quantity: Quantity) -> str:

@@ -69,7 +69,8 @@ def _run_figures(analysis: Analysis, run: MeasuredRun) -> list[Block]:
             part = "" if len(steady) <= TRACES else f"-{start // TRACES + 1}"
             figure = _spectrum_figure(analysis, run, quantity, steady[start : start + TRACES], part)
             figures.append(FigureBlock(figure, analysis.campaign.origin))
-        maps = [FigureBlock(_map_figure(run, *member), analysis.campaign.origin) for member in members if member[1].map]
+        drawn = [member for member in members if member[1].map is not None and member[1].map.times_s.size > 1]
+        maps = [FigureBlock(_map_figure(run, *member), analysis.campaign.origin) for member in drawn]
         figures += maps if quantity == "sound_pressure" else []
         if maps and quantity != "sound_pressure":
             figures.append(Details(f"Maps of {len(maps)} {quantity.replace('_', ' ')} channels", maps))

@@ -13,7 +13,7 @@ from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line
 from tdacoustic.reporting.palette import SERIES_SLOTS
-from tdacoustic.reporting.sections.words import joined, pretty_signs, slug, tested_runs
+from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit, slug, tested_runs
 from tdacoustic.results import Analysis
 from tdacoustic.speed import SpeedProfile, WheelSlip
 
@@ -88,10 +88,10 @@ def _said(by_teller: Mapping[tuple[str, str, str], Held]) -> Iterator[str]:
         high = max(float(profile.speed.max()) for _, profile in held) * factor
         kind = _KINDS[held[0][1].source].capitalize()
         words = f"{kind} {teller} tells the speed of {_of_what(shaft, si_symbol)} in {_counted(held)}, "
-        words += f"{low:.4g} to {high:.4g} {unit}"
+        words += "which stands" if low == high == 0.0 else pretty_signs(f"{low:.4g} to {high:.4g} {unit}")
         errors = [_relative_error(profile) for _, profile in held if profile.error is not None]
         errors = [error for error in errors if np.isfinite(error)]
-        if errors:
+        if errors and not low == high == 0.0:
             words += f"; a value's standard error is {_percent(max(errors))}"
             words += ", by the scatter of its edges" if held[0][1].source == "tacho" else ", by its own scatter"
         yield f"{words}."
@@ -148,7 +148,7 @@ def _not_found(runs: Sequence[MeasuredRun]) -> Iterator[str]:
 
 def _faults(runs: Sequence[MeasuredRun]) -> Iterator[str]:
     found = [
-        f"Run {run.name}, {profile.channel}: {'; '.join(profile.faults)}."
+        pretty_unit(f"Run {run.name}, {profile.channel}: {'; '.join(profile.faults)}.")
         for run in runs
         for profile in _profiles(run)
         if profile.faults
@@ -311,6 +311,7 @@ def _cell(row: Mapping[Hashable, Any], key: str) -> str | float | None:
     if key == "known_percent":
         return None if row["known_share"] is None else 100.0 * float(row["known_share"])
     if key == "remarks":
-        return "; ".join(str(row[part]) for part in ("reason", "notes") if isinstance(row[part], str) and row[part])
+        said = (str(row[part]) for part in ("reason", "notes") if isinstance(row[part], str) and row[part])
+        return pretty_unit("; ".join(said))
     value = row[key]
     return value if isinstance(value, str | float) else None

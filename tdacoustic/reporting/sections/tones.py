@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from tdacoustic.measured.runs import MeasuredRun, receivers
-from tdacoustic.measured.tonality import RunTonality, RunTone, Tonality
+from tdacoustic.measured.tonality import RunTonality, RunTone, SpeedSpan, Tonality
 from tdacoustic.reporting.document import (
     Block,
     Cell,
@@ -17,6 +18,8 @@ from tdacoustic.reporting.document import (
     Sentences,
     Table,
 )
+from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.tones_figures import audibility_figure, criterion_figure, run_up_figures
 from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, tested_runs
 from tdacoustic.results import Analysis
@@ -38,9 +41,12 @@ def tones(analysis: Analysis) -> Section | None:
     blocks: list[Block] = [Paragraph(_answer(analysis, found, microphones))]
     said = list(_sentences(analysis, found, microphones))
     if said:
-        blocks.append(Sentences(said))
+        blocks.append(Sentences([loudest for loudest, *_ in said]))
+    others = [sentence for _, *rest in said for sentence in rest]
+    if others:
+        blocks.append(Details(f"The other microphones, {len(others)} sentences", [Sentences(others)]))
     blocks += _figures(analysis, found, microphones)
-    blocks.append(_table(analysis, found))
+    blocks.append(in_sight(_table(analysis, found), "How tonal each microphone is"))
     doubts = _notes(found.ratings)
     if doubts:
         blocks.append(Details("What to know about these ratings", [Sentences(doubts)]))
@@ -103,14 +109,20 @@ def _conditions(names: Sequence[str]) -> str:
     return f"condition{'s' if len(names) > 1 else ''} {joined(list(names))}"
 
 
-def _sentences(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> Iterator[str]:
+def _sentences(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> Iterator[list[str]]:
+    """A condition's sentences, one a microphone, the one with the most audible tones first."""
     for condition in analysis.campaign.conditions():
         runs = _rated_runs(analysis, condition)
+        words = condition_words(analysis, condition)
+        said: list[tuple[float, str]] = []
         for name in microphones:
             rated = [(run, rating) for run in runs if (rating := found.rating(run.name, name, ISO)) is not None]
             if rated:
-                words = f"{condition_words(analysis, condition)}, {name}"
-                yield pretty_signs(f"{words}: {_of_receiver(found, name, rated)}")
+                audible = [r.mean_audibility_db for _, r in rated if r.mean_audibility_db is not None]
+                sentence = pretty_signs(f"{words}, {name}: {_of_receiver(found, name, rated)}")
+                said.append((max(audible, default=-math.inf), sentence))
+        if said:
+            yield [sentence for _, sentence in sorted(said, key=lambda item: -item[0])]
 
 
 def _of_receiver(found: Tonality, name: str, rated: Sequence[tuple[MeasuredRun, RunTonality]]) -> str:
@@ -232,41 +244,36 @@ def _figures(analysis: Analysis, found: Tonality, microphones: Sequence[str]) ->
     return [*blocks, *(FigureBlock(figure, origin) for figure in moving)]
 
 
+_AUDIBILITY: tuple[tuple[Column, Callable[[RunTonality], Cell]], ...] = (
+    (Column("mean_audibility_db", "Mean audibility", "dB", 1, "number"), lambda rating: rating.mean_audibility_db),
+    (Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"), lambda rating: rating.uncertainty_db),
+)
+
+
 def _table(analysis: Analysis, found: Tonality) -> Table:
     """One row a microphone of a run."""
-    columns = (
-        Column("condition", "Condition"),
-        Column("run", "Run"),
-        Column("channel", "Microphone"),
-        Column("verdict", "By ISO/TS 20065"),
-        Column("mean_audibility_db", "Mean audibility", "dB", 1, "number"),
-        Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"),
-        Column("adjustment_db", "Adjustment", "DIN 45681, dB", 0, "number"),
-        Column("n_spectra", "Spectra", "", 0, "number"),
-        Column("most_audible", "Most audible"),
-        Column("prominent", "Prominent by ECMA-418-1"),
-    )
-    rows: list[list[Cell]] = []
-    for rating in found.ratings:
-        if rating.method != ISO or rating.speed is not None:
-            continue
+    rated = [rating for rating in found.ratings if rating.method == ISO and rating.speed is None]
+
+    def adjustment(rating: RunTonality) -> float | None:
         din = found.rating(rating.run, rating.channel, DIN)
-        strongest = _most_audible(found.of(rating.run, rating.channel, ISO))[:1]
-        rows.append(
-            [
-                rating.condition,
-                rating.run,
-                rating.channel,
-                _verdict(rating),
-                rating.mean_audibility_db,
-                rating.uncertainty_db,
-                None if din is None else din.adjustment_db,
-                rating.n_spectra,
-                _tone_words(strongest[0]) if strongest else "none",
-                _prominent_cell(found, rating),
-            ]
-        )
-    return Table("tonality", "How tonal each microphone is", columns, rows, origin=analysis.campaign.origin)
+        return None if din is None else din.adjustment_db
+
+    def strongest(rating: RunTonality) -> str:
+        tones = _most_audible(found.of(rating.run, rating.channel, ISO))
+        return _tone_words(tones[0]) if tones else "none"
+
+    columns: list[tuple[Column, Callable[[RunTonality], Cell]]] = [
+        (Column("condition", "Condition"), lambda rating: rating.condition),
+        (Column("run", "Run"), lambda rating: rating.run),
+        (Column("channel", "Microphone"), lambda rating: rating.channel),
+        (Column("verdict", "By ISO/TS 20065"), _verdict),
+        *_AUDIBILITY,
+        (Column("adjustment_db", "Adjustment", "DIN 45681, dB", 0, "number"), adjustment),
+        (Column("n_spectra", "Spectra", "", 0, "number"), lambda rating: rating.n_spectra),
+        (Column("most_audible", "Most audible"), strongest),
+        (Column("prominent", "Prominent by ECMA-418-1"), lambda rating: _prominent_cell(found, rating)),
+    ]
+    return item_table("tonality", "How tonal each microphone is", rated, columns, analysis.campaign.origin)
 
 
 def _prominent_cell(found: Tonality, rating: RunTonality) -> str:
@@ -299,58 +306,40 @@ def _more_tables(analysis: Analysis, found: Tonality) -> list[Block]:
     blocks: list[Block] = []
     classes = [rating for rating in found.ratings if rating.speed is not None and rating.method == ISO]
     if classes:
-        columns = (
-            Column("run", "Run"),
-            Column("channel", "Microphone"),
-            Column("speed", "Speed"),
-            Column("mean_audibility_db", "Mean audibility", "dB", 1, "number"),
-            Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"),
-            Column("n_spectra", "Spectra", "", 0, "number"),
-        )
-        rows: list[list[Cell]] = [
-            [r.run, r.channel, r.speed.words() if r.speed else "", r.mean_audibility_db, r.uncertainty_db, r.n_spectra]
-            for r in classes
+        columns: list[tuple[Column, Callable[[RunTonality], Cell]]] = [
+            (Column("run", "Run"), lambda rating: rating.run),
+            (Column("channel", "Microphone"), lambda rating: rating.channel),
+            (Column("speed", "Speed"), lambda rating: _speed(rating.speed)),
+            *_AUDIBILITY,
+            (Column("n_spectra", "Spectra", "", 0, "number"), lambda rating: rating.n_spectra),
         ]
-        table = Table("tonality-classes", f"Audibility by speed class ({ISO})", columns, rows)
-        blocks.append(Details(f"Run-ups: {len(rows)} speed classes", [table]))
+        table = item_table("tonality-classes", f"Audibility by speed class ({ISO})", classes, columns)
+        blocks.append(Details(f"Run-ups: {len(classes)} speed classes", [table]))
     if found.tones:
         blocks.append(Details(f"All {len(found.tones)} ratings of tones", [_tone_table(analysis, found.tones)]))
     return blocks
 
 
 def _tone_table(analysis: Analysis, held: Sequence[RunTone]) -> Table:
-    columns = (
-        Column("run", "Run"),
-        Column("channel", "Microphone"),
-        Column("method", "Method"),
-        Column("speed", "Speed"),
-        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
-        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
-        Column("weighting", "Weighting"),
-        Column("value_db", "Value", "dB", 1, "number"),
-        Column("criterion_db", "Criterion", "dB", 1, "number"),
-        Column("verdict", "Verdict"),
-        Column("origin", "Order and owner"),
-        Column("notes", "Notes"),
-    )
-    rows: list[list[Cell]] = [
-        [
-            tone.run,
-            tone.channel,
-            tone.method,
-            "" if tone.speed is None else tone.speed.words(),
-            tone.frequency_hz,
-            tone.level_db,
-            tone.weighting,
-            tone.value_db,
-            tone.criterion_db,
-            _tone_verdict(tone),
-            _origin_words(tone),
-            "; ".join(tone.notes),
-        ]
-        for tone in held
+    columns: list[tuple[Column, Callable[[RunTone], Cell]]] = [
+        (Column("run", "Run"), lambda tone: tone.run),
+        (Column("channel", "Microphone"), lambda tone: tone.channel),
+        (Column("method", "Method"), lambda tone: tone.method),
+        (Column("speed", "Speed"), lambda tone: _speed(tone.speed)),
+        (Column("frequency_hz", "Frequency", "Hz", 1, "number"), lambda tone: tone.frequency_hz),
+        (Column("level_db", "Level", "dB re 20 µPa", 1, "number"), lambda tone: tone.level_db),
+        (Column("weighting", "Weighting"), lambda tone: tone.weighting),
+        (Column("value_db", "Value", "dB", 1, "number"), lambda tone: tone.value_db),
+        (Column("criterion_db", "Criterion", "dB", 1, "number"), lambda tone: tone.criterion_db),
+        (Column("verdict", "Verdict"), _tone_verdict),
+        (Column("origin", "Order and owner"), _origin_words),
+        (Column("notes", "Notes"), lambda tone: "; ".join(tone.notes)),
     ]
-    return Table("tones", "Tones by all methods", columns, rows, origin=analysis.campaign.origin)
+    return item_table("tones", "Tones by all methods", held, columns, analysis.campaign.origin)
+
+
+def _speed(span: SpeedSpan | None) -> str:
+    return "" if span is None else span.words()
 
 
 def _tone_verdict(tone: RunTone) -> str:

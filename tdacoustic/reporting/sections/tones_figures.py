@@ -142,7 +142,7 @@ def run_up_figures(found: Tonality, run: str, microphones: Sequence[str], method
     for name in microphones:
         rated = hearing.rated(name, method)
         start_s = next((raster.start_s for raster in hearing.rasters if name in raster.channels), 0.0)
-        if rated is not None and rated.starts_s.size:
+        if rated is not None and (rated.decisive_db > 0.0).any():  # else the sentence says that none is audible
             times = start_s + rated.starts_s + 0.5 * rated.averaging_s
             lines.append(Line(times, rated.decisive_db, name, points=True))
     figures = []

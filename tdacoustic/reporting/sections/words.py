@@ -15,6 +15,7 @@ from tdacoustic.results import Analysis
 __all__ = [
     "OWNER_SLOTS",
     "OWNER_SLOT_OTHER",
+    "UNKNOWN_SPEED",
     "by_frequency",
     "condition_words",
     "distinct_lines",
@@ -33,6 +34,8 @@ __all__ = [
 OWNER_SLOTS = {"motor": 0, "gearbox": 1, "ambiguous": 3, "unassigned": 7}
 """Colour of a source, the same in every figure."""
 OWNER_SLOT_OTHER = 2
+
+UNKNOWN_SPEED = "speed not known"
 
 SAME_LINE = 0.003
 """Relative distance within which two receivers' lines are named once in a sentence."""
@@ -61,10 +64,10 @@ def pretty_unit(symbol: str) -> str:
 
     Examples
     --------
-    >>> pretty_unit("m/s^2"), pretty_unit("1 um/s^2")
-    ('m/s²', '1 µm/s²')
+    >>> pretty_unit("m/s^2"), pretty_unit("1 um/s^2"), pretty_unit("81 us")
+    ('m/s²', '1 µm/s²', '81 µs')
     """
-    return re.sub(r"\bu(?=Pa|m)", "µ", symbol.replace("^2", "²"))
+    return re.sub(r"\bu(?=Pa|m)|(?<=\d )u(?=s\b)", "µ", symbol.replace("^2", "²"))
 
 
 def speed_words(run: MeasuredRun) -> str:
@@ -85,7 +88,7 @@ def speed_words(run: MeasuredRun) -> str:
             words.append(f"{of_shaft}{factor * profile.speed.min():.4g} to {factor * profile.speed.max():.4g} {unit}")
         if profile.source == "lines":
             words.append("read from lines")
-    return ", ".join(words) or "speed not known"
+    return pretty_signs(", ".join(words)) or UNKNOWN_SPEED
 
 
 def condition_words(analysis: Analysis, condition: str) -> str:

@@ -1,0 +1,33 @@
+"""Tables with many rows, folded away."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tdacoustic.reporting.document import Block, Details, Table
+
+__all__ = ["MOST_ROWS", "in_sight"]
+
+MOST_ROWS: Final = 24
+"""Rows of a table that stands in sight: about a page."""
+
+
+def in_sight(table: Table, what: str) -> Block:
+    """Return a table as it is, or folded away below one line where it has more than a page of rows.
+
+    Parameters
+    ----------
+    table : Table
+    what : str
+        The line's words before the number of rows.
+
+    Examples
+    --------
+    >>> from tdacoustic.reporting.document import Column
+    >>> columns = [Column("run", "Run")]
+    >>> in_sight(Table("few", "Few", columns, [["a"]]), "Runs").name
+    'few'
+    >>> in_sight(Table("many", "Many", columns, [["a"]] * 40), "Runs").summary
+    'Runs, 40 rows'
+    """
+    return table if len(table.rows) <= MOST_ROWS else Details(f"{what}, {len(table.rows)} rows", [table])
