@@ -4,6 +4,6 @@
 yields the samples in blocks.
 """
 
-from tdacoustic.formats.table import FORMATS, Format, scan
+from tdacoustic.formats.table import FORMATS, Format, formats, scan
 
-__all__ = ["FORMATS", "Format", "scan"]
+__all__ = ["FORMATS", "Format", "formats", "scan"]

@@ -1,18 +1,30 @@
-"""The table of formats, and how a file finds its row: by content, then by suffix."""
+"""The table of formats, and how a file finds its row: by content, then by suffix.
+
+A package of somebody else adds a row through the entry point group
+``tdacoustic.formats``, whose entries name a `Format` each::
+
+    [project.entry-points."tdacoustic.formats"]
+    ourlogger = "ourpackage.tdacoustic_format:FORMAT"
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from importlib import import_module
+from importlib.metadata import entry_points
 from pathlib import Path
 
-from tdacoustic.errors import FormatError, MissingFileError, TdacousticError
+from tdacoustic.errors import FormatError, MissingFileError, MissingPackageError, TdacousticError
 from tdacoustic.recording import Log
 
-__all__ = ["FORMATS", "Format", "scan"]
+__all__ = ["ENTRY_POINTS", "FORMATS", "Format", "formats", "scan"]
 
 HEAD_BYTES = 4096
+
+ENTRY_POINTS = "tdacoustic.formats"
+"""Group of the entry points through which other packages add a `Format`."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +41,8 @@ class Format:
         Given the first `HEAD_BYTES` bytes, says whether the content is this format.
     module : str
         Module with ``scan_file(path) -> Log``, imported when first used.
+    extra : str or None
+        The extra of tdacoustic that installs what the module imports, where that is not in the core.
     """
 
     name: str
@@ -36,6 +50,7 @@ class Format:
     suffixes: tuple[str, ...]
     matches: Callable[[bytes], bool]
     module: str
+    extra: str | None = None
 
 
 def _is_audio(head: bytes) -> bool:
@@ -70,19 +85,63 @@ FORMATS: tuple[Format, ...] = (
 """The table. Content decides; text, which has no signature of its own, stands last."""
 
 
+@cache
+def _added() -> tuple[tuple[Format, ...], tuple[str, ...]]:
+    """Rows of other packages, and why some could not be had."""
+    rows: list[Format] = []
+    problems: list[str] = []
+    for entry in entry_points(group=ENTRY_POINTS):
+        try:
+            row = entry.load()
+        except Exception as error:  # a broken package of somebody else must not stop the formats that work
+            problems.append(f"format {entry.name!r} ({entry.value}) cannot be loaded: {type(error).__name__}: {error}")
+            continue
+        if not isinstance(row, Format):
+            problems.append(f"format {entry.name!r} ({entry.value}) is {type(row).__name__}, not a Format")
+        elif row.name in {other.name for other in (*FORMATS, *rows)}:
+            problems.append(f"format {entry.name!r} ({entry.value}) is called {row.name!r}, which there is already")
+        else:
+            rows.append(row)
+    return tuple(rows), tuple(problems)
+
+
+def formats() -> tuple[Format, ...]:
+    """Return the table with the rows that other packages add; text still stands last."""
+    return (*FORMATS[:-1], *_added()[0], FORMATS[-1])
+
+
 def _format_of(path: Path, head: bytes) -> tuple[Format, tuple[str, ...]]:
-    by_suffix = next((row for row in FORMATS if path.suffix.lower() in row.suffixes), None)
     if not head:
         raise FormatError(f"{path}: the file is empty")
-    if by_suffix is not None and by_suffix.matches(head):
+    table = formats()
+    named = [row for row in table if path.suffix.lower() in row.suffixes]
+    by_suffix = next((row for row in named if row.matches(head)), None)
+    if by_suffix is not None:
         return by_suffix, ()
-    by_content = next((row for row in FORMATS if row.name != "delimited" and row.matches(head)), None)
+    by_content = next((row for row in table if row.name != "delimited" and row.matches(head)), None)
     if by_content is not None:
         return by_content, (f"the suffix is {path.suffix or 'absent'}, the content is {by_content.title}",)
-    if by_suffix is not None:
-        raise FormatError(f"{path}: no {by_suffix.title} file; it begins with {head[:12]!r}")
-    titles = ", ".join(f"{row.title} ({' '.join(row.suffixes)})" for row in FORMATS)
-    raise FormatError(f"{path}: format not known; known are {titles}")
+    problems = "".join(f"; {problem}" for problem in _added()[1])
+    if named:
+        raise FormatError(f"{path}: no {named[0].title} file; it begins with {head[:12]!r}{problems}")
+    titles = ", ".join(f"{row.title} ({' '.join(row.suffixes)})" for row in table)
+    raise FormatError(f"{path}: format not known; known are {titles}{problems}")
+
+
+def _scanned(row: Format, path: Path) -> Log:
+    """Let a format's module scan a file; whatever a format library raises, the user gets one clear line."""
+    try:
+        log: Log = import_module(row.module).scan_file(path)
+    except TdacousticError:
+        raise
+    except ModuleNotFoundError as error:
+        remedy = "" if row.extra is None else f": pip install 'tdacoustic[{row.extra}]'"
+        raise MissingPackageError(
+            f"{path}: reading {row.title} needs the package {error.name}, which is not installed{remedy}"
+        ) from error
+    except Exception as error:
+        raise FormatError(f"{path}: damaged {row.title} file ({type(error).__name__}: {error})") from error
+    return log
 
 
 def scan(path: str | Path) -> Log:
@@ -101,6 +160,8 @@ def scan(path: str | Path) -> Log:
     ------
     MissingFileError
         There is no such file.
+    MissingPackageError
+        Its format needs an extra that is not installed.
     FormatError
         It is of no known format, or not what it claims to be.
     """
@@ -113,12 +174,7 @@ def scan(path: str | Path) -> Log:
     except OSError as error:
         raise FormatError(f"{path}: cannot be read ({error.strerror})") from error
     row, flags = _format_of(path, head)
-    try:
-        log: Log = import_module(row.module).scan_file(path)
-    except TdacousticError:
-        raise
-    except Exception as error:  # whatever a format library raises, the user gets one clear line
-        raise FormatError(f"{path}: damaged {row.title} file ({type(error).__name__}: {error})") from error
+    log = _scanned(row, path)
     if not log.channels:
         raise FormatError(f"{path}: no channel in it that could be read")
     return replace(log, flags=(*flags, *log.flags)) if flags else log

@@ -11,7 +11,7 @@ from log_makers import chunk, lea_chunk, signals, wav_bytes
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats import scan
-from tdacoustic.formats.riff import start_time_of_bext
+from tdacoustic.formats.audio.riff import start_time_of_bext
 
 RAMP = np.array([[-32768, -1, 0, 1, 32767], [5, 4, 3, 2, 1]])
 

@@ -242,9 +242,9 @@ def test_written_numbers_come_back(log_of, rows, dialect):
 
 @pytest.mark.parametrize("quoted", [False, True])
 def test_rows_over_many_pieces(log_of, quoted, monkeypatch):
-    from tdacoustic.formats import text_rows
+    from tdacoustic.formats.delimited import rows
 
-    monkeypatch.setattr(text_rows, "CHUNK_BYTES", 1000)
+    monkeypatch.setattr(rows, "CHUNK_BYTES", 1000)
     x = np.random.default_rng(0).normal(size=(3000, 2))
     mark = '"' if quoted else ""
     log = log_of("a,b\n" + "".join(f"{mark}{a!r}{mark},{mark}{b!r}{mark}\n" for a, b in x.tolist()) + "\n\n")

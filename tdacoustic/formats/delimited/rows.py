@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.text_layout import WHITESPACE, Layout
-from tdacoustic.formats.text_stream import open_text_bytes
+from tdacoustic.formats.delimited.layout import WHITESPACE, Layout
+from tdacoustic.formats.delimited.stream import open_text_bytes
 
 __all__ = ["Rows", "count_rows"]
 

@@ -1,9 +1,9 @@
 """CSV, TSV and other texts of numbers in columns.
 
 Encoding, delimiter, decimal mark and heading are found out
-(`tdacoustic.formats.text_layout`), the rows are counted and checked in one pass
-over the bytes (`text_rows`), a time column gives the raster and is checked while
-the rows are read (`text_time`). The numbers are parsed by pandas' C engine.
+(`tdacoustic.formats.delimited.layout`), the rows are counted and checked in one pass
+over the bytes (`rows`), a time column gives the raster and is checked while
+the rows are read (`time_column`). The numbers are parsed by pandas' C engine.
 """
 
 from __future__ import annotations
@@ -19,11 +19,10 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import check_request, rebuffered, unique_names
-from tdacoustic.formats.rates import snap_rate
-from tdacoustic.formats.text_layout import WHITESPACE, Layout, is_number, read_layout, split_row
-from tdacoustic.formats.text_rows import Rows, count_rows
-from tdacoustic.formats.text_stream import decoded, open_text_bytes
-from tdacoustic.formats.text_time import (
+from tdacoustic.formats.delimited.layout import WHITESPACE, Layout, is_number, read_layout, split_row
+from tdacoustic.formats.delimited.rows import Rows, count_rows
+from tdacoustic.formats.delimited.stream import decoded, open_text_bytes
+from tdacoustic.formats.delimited.time_column import (
     TimeAxis,
     TimeCheck,
     claimed_rows,
@@ -35,6 +34,7 @@ from tdacoustic.formats.text_time import (
     stated_start,
     written_resolution,
 )
+from tdacoustic.formats.rates import snap_rate
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import quantity_of_unit
 

@@ -32,8 +32,8 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import check_request, rebuffered
-from tdacoustic.formats.hdf5_attributes import Attributes
-from tdacoustic.formats.hdf5_tree import Tree, read_tree
+from tdacoustic.formats.hdf5.attributes import Attributes
+from tdacoustic.formats.hdf5.tree import Tree, read_tree
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import QUANTITIES, quantity_of_unit
 
@@ -209,7 +209,7 @@ TimeVectors = dict[tuple[str, int], tuple[str, float, float, float | None]]
 
 def _time_vectors(file: Any, tree: Tree, flags: list[str]) -> TimeVectors:
     """Return (group, length) -> (name, rate, start, raw rate) of the equidistant time vectors."""
-    from tdacoustic.formats.hdf5_tree import raster_of_time_vector
+    from tdacoustic.formats.hdf5.tree import raster_of_time_vector
 
     found: TimeVectors = {}
     for name in tree.datasets:

@@ -1,6 +1,6 @@
 """WAV (RIFF, RIFX, RF64, BW64) and FLAC.
 
-The chunks are walked here (`tdacoustic.formats.riff`), so that the size which the
+The chunks are walked here (`tdacoustic.formats.audio.riff`), so that the size which the
 header claims is compared with what the file holds; the samples are decoded by
 `soundfile`. Integer samples are fractions of full scale. Calibration is not in
 the file, unless the vendor chunk ``LEA `` is there.
@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
+from tdacoustic.formats.audio.riff import WaveHeader, parse_lea, read_wave_header, start_time_of_bext
 from tdacoustic.formats.blocks import check_request, spans, unique_names
-from tdacoustic.formats.riff import WaveHeader, parse_lea, read_wave_header, start_time_of_bext
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import quantity_of_unit
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.text_layout import Layout
+from tdacoustic.formats.delimited.layout import Layout
 
 __all__ = [
     "TimeAxis",

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tdacoustic.errors import FormatError, UnitError
-from tdacoustic.formats.text_stream import decoded, encoding_of, open_text_bytes
+from tdacoustic.formats.delimited.stream import decoded, encoding_of, open_text_bytes
 from tdacoustic.units import parse_unit
 
 __all__ = ["WHITESPACE", "Layout", "is_number", "read_layout", "split_row"]

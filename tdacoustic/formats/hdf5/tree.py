@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from tdacoustic.formats.hdf5_attributes import Attributes
+from tdacoustic.formats.hdf5.attributes import Attributes
 from tdacoustic.formats.rates import snap_rate
 
 __all__ = ["Tree", "raster_of_time_vector", "read_tree"]

@@ -1,7 +1,7 @@
 """Universal file, data set 58 (ASCII) and 58b (binary): time records.
 
-The records are walked without reading their values (`uff_records`), the values
-are read in blocks (`uff_values`); `pyuff` takes whole files into memory and is the
+The records are walked without reading their values (`records`), the values
+are read in blocks (`values`); `pyuff` takes whole files into memory and is the
 oracle of the tests. What is no real, evenly spaced time signal is left out with a
 flag, and refused where nothing else is in the file.
 """
@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import check_request, rebuffered, unique_names
 from tdacoustic.formats.rates import snap_rate
-from tdacoustic.formats.uff_records import (
+from tdacoustic.formats.uff58.records import (
     Header58,
     Record,
     find_terminator,
@@ -28,7 +28,7 @@ from tdacoustic.formats.uff_records import (
     read_identifier,
     start_time_of,
 )
-from tdacoustic.formats.uff_values import AsciiValues, BinaryValues, LooseValues, count_loose_values
+from tdacoustic.formats.uff58.values import AsciiValues, BinaryValues, LooseValues, count_loose_values
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import quantity_of_unit
 
