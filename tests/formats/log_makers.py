@@ -1,5 +1,6 @@
 """Makers of small logs: soundfile, struct, h5py, plain text and pyuff, never the readers under test."""
 
+import importlib
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -227,3 +228,9 @@ MAKERS: list[Callable[[Path], Made]] = [
     make_uff_binary,
     make_uff_by_pyuff,
 ]
+
+
+def all_makers() -> list[Callable[[Path], Made]]:
+    """The makers above and those of every ``makers_<format>.py`` beside this file."""
+    modules = sorted(path.stem for path in Path(__file__).parent.glob("makers_*.py"))
+    return [*MAKERS, *(maker for module in modules for maker in importlib.import_module(module).MAKERS)]

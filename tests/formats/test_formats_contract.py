@@ -6,13 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from log_makers import MAKERS, RATE_HZ, N
+from log_makers import RATE_HZ, N, all_makers
 
 from tdacoustic.errors import FormatError, MissingFileError
 from tdacoustic.formats import FORMATS, scan
 
 
-@pytest.fixture(params=MAKERS, ids=lambda maker: maker.__name__)
+@pytest.fixture(params=all_makers(), ids=lambda maker: maker.__name__)
 def made(request, tmp_path):
     return request.param(tmp_path)
 
