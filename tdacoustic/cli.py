@@ -6,6 +6,7 @@ Nothing heavy is imported here; each command imports what it needs.
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -53,7 +54,12 @@ Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone.")]
 
 def _say(text: str) -> None:
     """Print a line on stderr."""
-    print(text, file=sys.stderr)
+    print(_inert(text), file=sys.stderr)
+
+
+def _inert(text: str) -> str:
+    """A text without what steers a terminal or turns the direction of writing: names of files come from outside."""
+    return re.sub("[\x00-\x08\x0b-\x1f\x7f-\x9f\u202a-\u202e\u2066-\u2069]", "\ufffd", text)
 
 
 @contextmanager
@@ -106,22 +112,25 @@ def _warn(problems: Iterable[str], quiet: bool) -> None:
 
 @app.command()
 def info(
-    logs: Logs, as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False, quiet: Quiet = False
+    logs: Logs,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    every_sample: Annotated[bool, typer.Option("--all", help="Read every sample of a large log too.")] = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Say what is in a log, in its own units."""
+    """Say what is in a log, in its own units; a large log is read in short stretches."""
     from tdacoustic.workflows.info import describe_log, info_text
 
     found = []
     for log in logs:
         with _progress(quiet) as progress:
             part: Any = None if progress is None else (lambda done, log=log: progress(f"reading {log.name}", done, 1))
-            found.append(describe_log(log, part))
+            found.append(describe_log(log, part, every_sample=every_sample))
     if as_json:
         import json
 
         print(json.dumps([log.as_json() for log in found], indent=2, ensure_ascii=False, allow_nan=False))
         return
-    print("\n\n".join(info_text(log) for log in found))
+    print(_inert("\n\n".join(info_text(log) for log in found)))
 
 
 @app.command()

@@ -60,7 +60,7 @@ class Unit:
 
 def _table() -> dict[str, Unit]:
     rows: list[tuple[str, str, float, float]] = [  # spellings, SI symbol, factor, offset
-        ("Pa pascal Pascal PA", "Pa", 1.0, 0.0),
+        ("Pa pascal Pascal PA pascals Pascals", "Pa", 1.0, 0.0),
         ("hPa mbar", "Pa", 100.0, 0.0),
         ("kPa", "Pa", 1e3, 0.0),
         ("MPa", "Pa", 1e6, 0.0),
@@ -81,11 +81,11 @@ def _table() -> dict[str, Unit]:
         ("m/s", "m/s", 1.0, 0.0),
         ("mm/s", "m/s", 1e-3, 0.0),
         ("km/h kph kmh km/hr", "m/s", 1.0 / 3.6, 0.0),
-        ("V volt Volt v", "V", 1.0, 0.0),
+        ("V volt Volt v volts Volts", "V", 1.0, 0.0),
         ("mV", "V", 1e-3, 0.0),
         ("uV", "V", 1e-6, 0.0),
         ("kV", "V", 1e3, 0.0),
-        ("A ampere", "A", 1.0, 0.0),
+        ("A ampere Ampere amperes Amperes amps Amps", "A", 1.0, 0.0),
         ("mA", "A", 1e-3, 0.0),
         ("kA", "A", 1e3, 0.0),
         ("pC", "C", 1e-12, 0.0),

@@ -470,10 +470,10 @@ def test_info_as_json(tda, tmp_path):
     code, out, err = tda("info", "a.h5", "--json")
     assert (code, err) == (0, "")
     (log,) = json.loads(out, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
-    assert set(log) == {"file", "format", "channels", "flags"}
+    assert set(log) == {"file", "format", "channels", "flags", "metadata", "companions"}
     assert (log["file"], log["format"]) == ("a.h5", "hdf5")
     mic, x = log["channels"]
-    assert list(mic) == "name unit quantity sample_rate_hz n_samples start mean rms min max flags".split()  # noqa: SIM905
+    assert list(mic) == "name unit quantity sample_rate_hz n_samples start mean rms min max flags n_read".split()  # noqa: SIM905
     assert (mic["name"], mic["unit"], mic["quantity"], mic["n_samples"]) == ("mic", "Pa", "sound_pressure", 4096)
     assert mic["sample_rate_hz"] == RATE_HZ
     assert mic["rms"] == pytest.approx(0.2, rel=1e-6)
@@ -486,6 +486,7 @@ def test_info_of_several_logs_as_text(tda, tmp_path):
     code, out, err = tda("info", "a.h5", "b.h5")
     assert (code, err) == (0, "")
     assert out.count("sound_pressure") == 2
+    assert tda("info", "a.h5", "b.h5", "--all") == (0, out, "")
 
 
 def test_init_then_run(tda, tmp_path):

@@ -84,6 +84,8 @@ class CampaignChannel(Table):
         As ``"10.2 mV/(m/s^2)"``, for electrical signals.
     full_scale : str or None
         As ``"20 Pa"``, for numbers that are fractions of a full scale.
+    sensor : str or None
+        Serial number in the campaign's sensor database, which then gives the sensitivity.
     direction : str or None
         As ``"z"``.
     position_m : (float, float, float) or None
@@ -115,6 +117,7 @@ class CampaignChannel(Table):
     unit: Annotated[Text, AfterValidator(_unit)] | None = None
     sensitivity: Annotated[str, AfterValidator(_sensitivity)] | None = None
     full_scale: Annotated[str, AfterValidator(_full_scale)] | None = None
+    sensor: Text | None = None
     direction: Text | None = None
     position_m: tuple[float, float, float] | None = None
     distance_m: NonNegative | None = None

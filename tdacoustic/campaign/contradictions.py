@@ -9,6 +9,7 @@ from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.model import Campaign
 from tdacoustic.campaign.railway import railway_contradictions
 from tdacoustic.campaign.runs import CampaignRun
+from tdacoustic.toml_models import nearest
 
 __all__ = ["MAX_SPEED_RATIO", "contradictions"]
 
@@ -34,6 +35,7 @@ def contradictions(campaign: Campaign) -> tuple[str, ...]:
         *_emptiness(campaign),
         *_channel_contradictions(campaign.channels),
         *_run_contradictions(campaign.runs),
+        *_calibrated_contradictions(campaign),
         *_speed_contradictions(campaign),
         *railway_contradictions(campaign.channels, campaign.runs, campaign.railway),
         *_level_contradictions(campaign),
@@ -72,6 +74,15 @@ def _run_contradictions(runs: Sequence[CampaignRun]) -> Iterator[str]:
             elif run.valid and other.valid and _same_data(run, other):
                 logs = ", ".join(log.text for log in run.logs)
                 yield f"runs {other.name!r} and {run.name!r} have the same data: {logs}, {_cut_in_words(run)}"
+
+
+def _calibrated_contradictions(campaign: Campaign) -> Iterator[str]:
+    names = [channel.name for channel in campaign.channels]
+    for run in campaign.runs:
+        for name in run.calibrated:
+            if name not in names:
+                said = f"run {run.name!r}: calibrated names channel {name!r}, which is not there"
+                yield f"{said}; the nearest is {nearest(name, names)!r}"
 
 
 def _same_data(run: CampaignRun, other: CampaignRun) -> bool:

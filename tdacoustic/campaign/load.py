@@ -13,9 +13,10 @@ from tdacoustic.campaign.messages import VOCABULARY, campaign_error, problem_lin
 from tdacoustic.campaign.model import SCHEMA, Campaign, CampaignFile
 from tdacoustic.campaign.run_table import read_run_table
 from tdacoustic.campaign.runs import with_names
+from tdacoustic.campaign.sensor_table import read_sensor_table, with_sensors
 from tdacoustic.campaign.values import WrittenPath
 from tdacoustic.errors import CampaignError
-from tdacoustic.toml_models import check_schema, file_or_inside, meta_lines, read_toml
+from tdacoustic.toml_models import check_schema, file_or_inside, meta_lines, path_problem, read_toml
 from tdacoustic.toml_models import frozen as _frozen
 
 __all__ = ["load_campaign"]
@@ -60,18 +61,19 @@ def load_campaign(path: str | Path) -> Campaign:
     _check_schema(path, raw)
     labels: dict[int, str] = {}
     table = raw.get("runs")
-    if isinstance(table, str) and table.strip() and "\0" not in table:
+    if isinstance(table, str) and path_problem(table) is None:
         if raw.get("run"):
             raise CampaignError(f"{path}: runs = {table!r} and [[run]] both stand in the file; leave one out")
         raw["run"], labels = read_run_table(WrittenPath.of(table, path.parent).path)
     file = _validated(path, raw, labels)
+    sensors = () if file.sensors is None else read_sensor_table(file.sensors.path)
     campaign = Campaign(
         path=path,
         name=file.name or path.parent.name or path.stem,
         origin=file.origin,
         fleet=file.fleet,
         meta=tuple(meta_lines(file.meta)),
-        channels=file.channel,
+        channels=with_sensors(path, file.channel, sensors, file.sensors),
         run_table=file.runs,
         runs=with_names(file.run),
         levels=file.level,
@@ -80,6 +82,8 @@ def load_campaign(path: str | Path) -> Campaign:
         analysis=file.analysis,
         calibration=file.calibration,
         railway=file.railway,
+        sensor_table=file.sensors,
+        sensors=sensors,
     )
     problems = contradictions(campaign)
     if problems:

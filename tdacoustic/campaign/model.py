@@ -16,6 +16,7 @@ from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.campaign.settings import AnalysisSettings
 from tdacoustic.campaign.values import StatedPath, WrittenPath
 from tdacoustic.errors import CampaignError
+from tdacoustic.sensors import SensorEntry
 from tdacoustic.toml_models import Table, Text
 
 __all__ = ["SCHEMA", "Campaign", "CampaignFile", "Origin"]
@@ -34,6 +35,7 @@ class CampaignFile(Table):
     origin: Origin
     fleet: StatedPath | None = None
     runs: StatedPath | None = None
+    sensors: StatedPath | None = None
     meta: dict[str, Any] = Field(default_factory=dict)
     channel: tuple[CampaignChannel, ...] = ()
     run: tuple[CampaignRun, ...] = ()
@@ -73,6 +75,10 @@ class Campaign:
     calibration : CalibrationSettings
     railway : RailwaySettings or None
         None where the file has no such table.
+    sensor_table : WrittenPath or None
+        The ``sensors.csv`` that the sensitivities stand in.
+    sensors : tuple of SensorEntry
+        What it holds.
     """
 
     path: Path
@@ -89,6 +95,8 @@ class Campaign:
     analysis: AnalysisSettings = field(default_factory=AnalysisSettings)
     calibration: CalibrationSettings = field(default_factory=CalibrationSettings)
     railway: RailwaySettings | None = None
+    sensor_table: WrittenPath | None = None
+    sensors: tuple[SensorEntry, ...] = ()
 
     @property
     def folder(self) -> Path:

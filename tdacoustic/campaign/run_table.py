@@ -10,17 +10,20 @@ from typing import Any, Final
 from tdacoustic.campaign.messages import VOCABULARY
 from tdacoustic.campaign.runs import CampaignRun
 from tdacoustic.errors import CampaignError, MissingFileError
+from tdacoustic.toml_models import small_file, steering_sign
 
 __all__ = ["read_run_table"]
 
-_TEXT_COLUMNS: Final = frozenset({"name", "condition", "kind", "mode", "direction", "test", "reject_reason"})
+_TEXT_COLUMNS: Final = frozenset(
+    {"name", "condition", "kind", "mode", "direction", "test", "reject_reason", "date", "calibrator", "align"}
+)
 _BOOLEANS: Final = {"true": True, "false": False}
 
 
 def _cell(column: str, text: str) -> Any:
     if column in _TEXT_COLUMNS:
         return text
-    if column == "logs":
+    if column in ("logs", "calibrated", "align_on"):
         return tuple(part.strip() for part in text.replace(";", "|").split("|") if part.strip())
     if column == "valid":
         return _BOOLEANS.get(text.lower(), text)
@@ -73,11 +76,13 @@ def read_run_table(path: Path) -> tuple[tuple[dict[str, Any], ...], dict[int, st
     if not path.is_file():
         raise MissingFileError(f"{path}: no such file (runs = ... in the campaign file names it)")
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = small_file(path, CampaignError).decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CampaignError(f"{path}: is not UTF-8 (byte {error.start}); save it as CSV UTF-8") from error
-    except OSError as error:
-        raise CampaignError(f"{path}: cannot be read ({error.strerror})") from error
+    sign = steering_sign(text)
+    if sign is not None:
+        line = text[: text.index(sign)].count("\n") + 1
+        raise CampaignError(f"{path}: line {line} has the sign {sign!a}, which no text here may have")
     first = text.split("\n", 1)[0]
     delimiter = ";" if first.count(";") > first.count(",") else ","
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=delimiter, strict=True)

@@ -2,23 +2,45 @@
 
 from __future__ import annotations
 
+import datetime
 from collections import Counter
 from collections.abc import Sequence
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tdacoustic.campaign.railway import RailwayTest, passage_problem
 from tdacoustic.campaign.values import StatedPath
-from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text
+from tdacoustic.sensors import parse_calibrator
+from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text, each_once
 
-__all__ = ["CampaignRun", "Kind", "Mode", "with_names"]
+__all__ = ["Alignment", "CampaignRun", "Kind", "Mode", "with_names"]
 
 Kind = Literal["test", "background", "calibration_before", "calibration_after"]
 """What a run is for."""
 
 Mode = Literal["traction", "brake", "coast", "hauled"]
 """How the drive was working."""
+
+Alignment = Literal["start", "time_stamps", "shared"]
+"""How the logs of a run are put on one time axis."""
+
+LogNumber = Annotated[int, BeforeValidator(lambda value: int(value) if value in range(1, 1000) else value), Field(ge=1)]
+"""Which log of a run, from 1; a table's cell is a number with a point."""
+
+
+def _date(value: Any) -> str:
+    if isinstance(value, datetime.date):  # TOML has dates of its own
+        return value.isoformat()[:10]
+    try:
+        return datetime.date.fromisoformat(str(value).strip()).isoformat()
+    except ValueError:
+        raise ValueError(f"must be a day as '2026-05-04', got {value!r}") from None
+
+
+def _calibrator(text: str) -> str:
+    parse_calibrator(text)
+    return text
 
 
 class CampaignRun(Table):
@@ -53,9 +75,30 @@ class CampaignRun(Table):
         Only where the log does not say.
     start_s, end_s : float or None
         Cut, from the run's common start.
+    align : str or None
+        One of `Alignment`: the logs started together, started when their time stamps say, or are aligned by a signal
+        that all of them hold. Default: ``"shared"`` where `align_on` is stated, else by time stamps where all logs
+        state a zone and parts of a second and differ, else started together.
+    align_on : tuple of str
+        The shared signal: one channel for each log, in their order, or one that all logs hold; by its name among the
+        ``[[channel]]``, else by its name in the logs.
+    reference_log : int or None
+        Whose clock counts, from 1. Default: the first.
+    max_offset_s : float or None
+        How far a log's start may lie from where time stamps put it (the reference's start without them), for a shared
+        signal that repeats itself.
     test : str or None
         What a railway standard calls the run: ``"pass-by"``, ``"stationary"``, ``"starting"``, ``"braking"`` or
         ``"constant-speed"``.
+    date : str or None
+        Day of the run, as ``"2026-05-04"``; only where the log does not say. A sensor's calibration is chosen by it.
+    calibrator : str or None
+        What the calibrator of a calibration run gives: ``"94 dB"``, ``"10 m/s^2"``, ``"1 g peak"``. Without it such a
+        run is only reported.
+    calibrator_frequency_hz : float or None
+        Default: what such calibrators usually have.
+    calibrated : tuple of str
+        Channels that it was put on. Default: those of its quantity in which its tone stands out.
     front_s, middle_s, rear_s : float or None
         Of a pass-by: when the unit's front, middle and rear are opposite the microphone, from the run's common start.
     valid : bool
@@ -79,6 +122,14 @@ class CampaignRun(Table):
     sample_rate_hz: Positive | None = None
     start_s: float | None = None
     end_s: float | None = None
+    align: Alignment | None = None
+    align_on: Annotated[tuple[Text, ...], AfterValidator(each_once)] = ()
+    reference_log: LogNumber | None = None
+    max_offset_s: Positive | None = None
+    date: Annotated[str, BeforeValidator(_date)] | None = None
+    calibrator: Annotated[Text, AfterValidator(_calibrator)] | None = None
+    calibrator_frequency_hz: Positive | None = None
+    calibrated: Annotated[tuple[Name, ...], AfterValidator(each_once)] = ()
     test: RailwayTest | None = None
     front_s: float | None = None
     middle_s: float | None = None
@@ -98,6 +149,10 @@ class CampaignRun(Table):
         if self.valid and self.reject_reason is not None:
             raise ValueError(f"reject_reason {self.reject_reason!r} stands beside valid = true; set valid = false")
         self._one_speed()
+        keys = [key for key in ("calibrator", "calibrator_frequency_hz", "calibrated") if getattr(self, key)]
+        if keys and not self.is_calibration:
+            raise ValueError(f"{keys[0]} is of a run of kind 'calibration_before' or 'calibration_after'")
+        self._one_axis()
         problem = passage_problem(self)
         if problem is not None:
             raise ValueError(problem)
@@ -106,6 +161,27 @@ class CampaignRun(Table):
             if count > 1:
                 raise ValueError(f"logs names {text!r} {count} times, got {written}")
         return self
+
+    @property
+    def is_calibration(self) -> bool:
+        """Whether a calibrator was recorded in it."""
+        return self.kind.startswith("calibration")
+
+    def _one_axis(self) -> None:
+        """Raise where keys of several logs contradict each other, or name a log that is not there."""
+        keys = [key for key in ("align", "align_on", "reference_log", "max_offset_s") if getattr(self, key)]
+        if keys and len(self.logs) == 1:
+            raise ValueError(f"{keys[0]} is of a run of several logs, but logs names one")
+        if self.align == "shared" and not self.align_on:
+            raise ValueError("align = 'shared' needs align_on, the channels that hold the shared signal; it is missing")
+        if self.align_on and self.align not in (None, "shared"):
+            raise ValueError(f"align_on is for align = 'shared', but align is {self.align!r}")
+        if self.max_offset_s is not None and not self.align_on:
+            raise ValueError("max_offset_s bounds the search of a shared signal, but align_on is missing")
+        if len(self.align_on) not in (0, 1, len(self.logs)):
+            raise ValueError(f"align_on must name one channel, or one for each of the {len(self.logs)} logs")
+        if self.reference_log is not None and self.reference_log > len(self.logs):
+            raise ValueError(f"reference_log = {self.reference_log}, but there are {len(self.logs)} logs")
 
     def _one_speed(self) -> None:
         """Raise where a start is stated twice, or beside a speed that holds for the whole run."""

@@ -49,6 +49,9 @@ class AnalysisSettings(Table):
         6000 rpm.
     motor_speed_change_rpm_s : float or None
         By how much the motor's speed changes in a second at most. Default: that of 2.5 m/s² of the train, else 480.
+    calibrators : str
+        ``"check"``: calibrator runs set the scale of channels of which nobody states one, and check it elsewhere.
+        ``"set"``: they set it everywhere.
     """
 
     orders: Annotated[tuple[Positive, ...], AfterValidator(each_once)] = ()
@@ -65,3 +68,4 @@ class AnalysisSettings(Table):
     speed_from: Literal["auto", "channels", "lines"] = "auto"
     motor_speed_range_rpm: Annotated[tuple[Positive, Positive], AfterValidator(ascending)] | None = None
     motor_speed_change_rpm_s: Positive | None = None
+    calibrators: Literal["check", "set"] = "check"

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, ValidationInfo
 
-from tdacoustic.toml_models import NonNegative
+from tdacoustic.toml_models import NonNegative, path_problem
 
 __all__ = ["FrequencyBand", "StatedPath", "WrittenPath", "ascending"]
 
@@ -42,8 +42,9 @@ def _path(value: Any, info: ValidationInfo) -> WrittenPath:
         return value
     if not isinstance(value, str) or not value.strip():
         raise ValueError(f"must be a path relative to the campaign file, got {value!r}")
-    if "\0" in value:
-        raise ValueError(f"must be a path, got {value!r}")
+    problem = path_problem(value)
+    if problem is not None:
+        raise ValueError(f"must be a path: {value[:80]!r} {problem}")
     return WrittenPath.of(value, (info.context or {}).get("folder", Path()))
 
 
@@ -58,4 +59,4 @@ FrequencyBand = Annotated[tuple[NonNegative, NonNegative], AfterValidator(ascend
 """``[from, to]`` in Hz."""
 
 StatedPath = Annotated[WrittenPath, BeforeValidator(_path)]
-"""A path, resolved against the folder in the validation context."""
+"""A path by the rule of `tdacoustic.toml_models.paths`, resolved against the folder in the validation context."""

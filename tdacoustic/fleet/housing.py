@@ -8,7 +8,7 @@ from pydantic import Field
 
 from tdacoustic.fleet.parameter import Parameter, default
 from tdacoustic.fleet.values import LossFactor, Point, Stiffness, Triple
-from tdacoustic.toml_models import Positive, Table, Text
+from tdacoustic.toml_models import PathText, Positive, Table
 
 __all__ = ["Housing", "HousingSeat", "Material"]
 
@@ -90,5 +90,5 @@ class Housing(Table):
     loss_factor: Parameter[LossFactor] = default(0.02)
     cavity_loss_factor: Parameter[LossFactor] = default(0.01)
     hanger_stiffness_n_per_m: Parameter[Stiffness] = default((2e7, 2e7, 2e7))
-    step_file: Parameter[Text] | None = None
+    step_file: Parameter[PathText] | None = None
     seat: tuple[HousingSeat, ...] = ()

@@ -9,6 +9,7 @@ A package of somebody else adds a row through the entry point group
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache
@@ -17,6 +18,8 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from tdacoustic.errors import FormatError, MissingFileError, MissingPackageError, TdacousticError
+from tdacoustic.formats.bounds import bounded
+from tdacoustic.formats.closed import closed_by_content, closed_by_suffix
 from tdacoustic.recording import Log
 
 __all__ = ["ENTRY_POINTS", "FORMATS", "Format", "formats", "scan"]
@@ -61,10 +64,36 @@ def _is_hdf5(head: bytes) -> bool:
     return any(head[at : at + 8] == b"\x89HDF\r\n\x1a\n" for at in (0, 512, 1024, 2048))
 
 
+def _is_tdms(head: bytes) -> bool:
+    return head[:4] in (b"TDSm", b"TDSh")  # the latter an index, which its reader answers
+
+
+def _is_matlab(head: bytes) -> bool:
+    if head.startswith((b"MATLAB 5.0 MAT-file", b"MATLAB 7.3 MAT-file")):
+        return True
+    if head[124:128] in (b"\x00\x01IM", b"\x01\x00MI", b"\x00\x02IM", b"\x02\x00MI"):
+        return True
+    from tdacoustic.formats.matlab.level4 import is_level4
+
+    return is_level4(head)
+
+
 def _is_uff(head: bytes) -> bool:
     lines = head.splitlines()
     lines = [line.strip() for line in lines if line.strip()][:2]
     return len(lines) == 2 and lines[0] == b"-1" and lines[1][:6].rstrip(b"bB ").isdigit()
+
+
+def _is_atfx(head: bytes) -> bool:
+    return head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" and b"atfx_file" in head
+
+
+def _is_mdf(head: bytes) -> bool:
+    return head[:8] in (b"MDF     ", b"UnFinMF ")
+
+
+def _is_dewesoft(head: bytes) -> bool:
+    return head.startswith(b"MULTI_STREAM_FILE_VER")
 
 
 def _is_text(head: bytes) -> bool:
@@ -78,8 +107,20 @@ def _is_text(head: bytes) -> bool:
 
 FORMATS: tuple[Format, ...] = (
     Format("audio", "WAV or FLAC", (".wav", ".wave", ".flac", ".rf64", ".bwf"), _is_audio, "tdacoustic.formats.audio"),
+    Format("matlab", "MATLAB", (".mat",), _is_matlab, "tdacoustic.formats.matlab"),
     Format("hdf5", "HDF5", (".h5", ".hdf5", ".he5"), _is_hdf5, "tdacoustic.formats.hdf5"),
     Format("uff58", "UFF 58 or 58b", (".uff", ".unv", ".bunv", ".uf"), _is_uff, "tdacoustic.formats.uff58"),
+    Format("tdms", "TDMS", (".tdms", ".tdms_index"), _is_tdms, "tdacoustic.formats.tdms"),
+    Format("atfx", "ASAM ODS ATFX", (".atfx",), _is_atfx, "tdacoustic.formats.atfx"),
+    Format("mdf4", "MDF 4", (".mf4", ".mdf"), _is_mdf, "tdacoustic.formats.mdf4"),
+    Format(
+        "dewesoft",
+        "Dewesoft DXD or D7D (not verified on a real recording)",
+        (".dxd", ".d7d"),
+        _is_dewesoft,
+        "tdacoustic.formats.dewesoft",
+        extra="dewesoft",
+    ),
     Format("delimited", "CSV or TSV", (".csv", ".tsv", ".txt", ".asc"), _is_text, "tdacoustic.formats.delimited"),
 )
 """The table. Content decides; text, which has no signature of its own, stands last."""
@@ -116,11 +157,17 @@ def _format_of(path: Path, head: bytes) -> tuple[Format, tuple[str, ...]]:
     table = formats()
     named = [row for row in table if path.suffix.lower() in row.suffixes]
     by_suffix = next((row for row in named if row.matches(head)), None)
-    if by_suffix is not None:
+    closed = closed_by_content(path.suffix.lower(), head)
+    if by_suffix is not None and (closed is None or by_suffix.name != "delimited"):
         return by_suffix, ()
     by_content = next((row for row in table if row.name != "delimited" and row.matches(head)), None)
     if by_content is not None:
         return by_content, (f"the suffix is {path.suffix or 'absent'}, the content is {by_content.title}",)
+    if closed is not None:
+        raise FormatError(f"{path}: is {closed.title}; {closed.remedy}")
+    closed = closed_by_suffix(path.suffix.lower())
+    if closed is not None:
+        raise FormatError(f"{path}: is, by its suffix, {closed.title}; {closed.remedy}")
     problems = "".join(f"; {problem}" for problem in _added()[1])
     if named:
         raise FormatError(f"{path}: no {named[0].title} file; it begins with {head[:12]!r}{problems}")
@@ -142,6 +189,25 @@ def _scanned(row: Format, path: Path) -> Log:
     except Exception as error:
         raise FormatError(f"{path}: damaged {row.title} file ({type(error).__name__}: {error})") from error
     return log
+
+
+def _head_of(path: Path) -> bytes:
+    """First bytes of a file; a pipe, a device, a folder and the endless files of /proc are refused unopened."""
+    try:
+        status = path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a null character
+        if isinstance(error, FileNotFoundError | NotADirectoryError | ValueError):
+            raise MissingFileError(f"{path}: no such file") from None
+        raise FormatError(f"{path}: cannot be read ({error.strerror})") from None
+    if not stat.S_ISREG(status.st_mode):
+        raise MissingFileError(f"{path}: is not a file")
+    if status.st_size == 0:
+        raise FormatError(f"{path}: the file is empty")
+    try:
+        with path.open("rb") as stream:
+            return stream.read(HEAD_BYTES)
+    except OSError as error:
+        raise FormatError(f"{path}: cannot be read ({error.strerror})") from error
 
 
 def scan(path: str | Path) -> Log:
@@ -166,15 +232,9 @@ def scan(path: str | Path) -> Log:
         It is of no known format, or not what it claims to be.
     """
     path = Path(path)
-    if not path.is_file():
-        raise MissingFileError(f"{path}: no such file" if not path.exists() else f"{path}: is not a file")
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(HEAD_BYTES)
-    except OSError as error:
-        raise FormatError(f"{path}: cannot be read ({error.strerror})") from error
+    head = _head_of(path)
     row, flags = _format_of(path, head)
     log = _scanned(row, path)
     if not log.channels:
         raise FormatError(f"{path}: no channel in it that could be read")
-    return replace(log, flags=(*flags, *log.flags)) if flags else log
+    return bounded(replace(log, flags=(*flags, *log.flags)) if flags else log)

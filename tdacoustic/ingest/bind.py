@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tdacoustic.campaign import CampaignChannel, CampaignRun
 from tdacoustic.errors import CampaignError, UnitError
+from tdacoustic.ingest.axes import LogAxis, RunAxes
 from tdacoustic.ingest.bound import Bound, Refusal
 from tdacoustic.ingest.conversion import convert
 from tdacoustic.ingest.cut import cut_raster
+from tdacoustic.ingest.known_scale import KnownScale
 from tdacoustic.ingest.sources import NotFoundError, find_source
 from tdacoustic.recording import Channel, Log, LogChannel, Recording
 
@@ -22,11 +24,17 @@ class _RefusedError(Exception):
     """Why a channel cannot be used."""
 
 
-def bind_run(channels: Sequence[CampaignChannel], run: CampaignRun, logs: Sequence[Log]) -> Bound:
+def bind_run(
+    channels: Sequence[CampaignChannel],
+    run: CampaignRun,
+    logs: Sequence[Log],
+    scales: Mapping[str, KnownScale] | None = None,
+    axes: RunAxes | None = None,
+) -> Bound:
     """Bind a run's logs to the campaign's channels.
 
-    Times count from the common start of the logs: their first instants are taken as
-    the same, which is warned of where the logs state otherwise. A cut keeps that axis.
+    Times count from the start of the reference log. Without `axes` the first instants of all logs are taken as the
+    same, which is warned of where the logs state otherwise. A cut keeps that axis.
 
     Parameters
     ----------
@@ -34,6 +42,10 @@ def bind_run(channels: Sequence[CampaignChannel], run: CampaignRun, logs: Sequen
     run : CampaignRun
     logs : sequence of Log
         Scanned, in the order of ``run.logs``.
+    scales : mapping of str to KnownScale, optional
+        By channel, where the scale is not, or not only, that of its ``[[channel]]``.
+    axes : RunAxes, optional
+        Where the logs' own times lie on the run's: starts are moved and rates corrected, nothing is resampled.
 
     Returns
     -------
@@ -51,10 +63,11 @@ def bind_run(channels: Sequence[CampaignChannel], run: CampaignRun, logs: Sequen
     _check_rate(run, logs)
     bound: list[Channel] = []
     refused: list[Refusal] = []
-    warnings: list[str] = _start_warnings(run, logs)
+    warnings = list(axes.warnings) if axes is not None else _start_warnings(run, logs)
     for channel in channels:
         try:
-            found, doubts, file = _bind_channel(channel, run, logs)
+            held = _in_the_reference(channel, run, logs, axes)
+            found, doubts, file = _bind_channel(held, run, logs, (scales or {}).get(channel.name), axes)
         except _RefusedError as error:
             refused.append(Refusal(run.name, channel.name, str(error)))
             continue
@@ -85,8 +98,21 @@ def _start_warnings(run: CampaignRun, logs: Sequence[Log]) -> list[str]:
     ]
 
 
+def _in_the_reference(
+    channel: CampaignChannel, run: CampaignRun, logs: Sequence[Log], axes: RunAxes | None
+) -> CampaignChannel:
+    """Take the shared channel that all logs hold from the reference log."""
+    if axes is None or run.align_on != (channel.name,) or channel.log is not None:
+        return channel
+    return channel.model_copy(update={"log": axes.reference + 1})
+
+
 def _bind_channel(
-    channel: CampaignChannel, run: CampaignRun, logs: Sequence[Log]
+    channel: CampaignChannel,
+    run: CampaignRun,
+    logs: Sequence[Log],
+    known: KnownScale | None,
+    axes: RunAxes | None,
 ) -> tuple[Channel, tuple[str, ...], str]:
     files = ", ".join(log.path.name for log in logs)
     try:
@@ -98,26 +124,36 @@ def _bind_channel(
     log = logs[place.log_index]
     source = log.channels[place.column]
     try:
-        found, doubts = _scaled(channel, run, source, place.log_index, place.column)
+        axis = LogAxis() if axes is None else axes.axes[place.log_index]
+        found, doubts = _scaled(channel, run, source, (place.log_index, place.column), known, axis)
     except UnitError as error:
         raise _RefusedError(f"channel {channel.name!r} (run {run.name}, {log.path.name}): {error}") from None
     return found, (*place.warnings, *doubts), log.path.name
 
 
 def _scaled(
-    channel: CampaignChannel, run: CampaignRun, source: LogChannel, log_index: int, column: int
+    channel: CampaignChannel,
+    run: CampaignRun,
+    source: LogChannel,
+    place: tuple[int, int],
+    known: KnownScale | None,
+    axis: LogAxis,
 ) -> tuple[Channel, tuple[str, ...]]:
-    conversion = convert(source, channel.scale)
+    conversion = convert(source, channel.scale) if known is None else known.convert(source, channel.scale)
     if conversion.quantity == "tacho" and channel.pulses_per_rev is None:
         raise UnitError("a tacho needs its pulses per revolution, add pulses_per_rev = ... to its [[channel]]")
     rate = source.raster.sample_rate_hz or run.sample_rate_hz
     if rate is None:
         raise UnitError("the log states no sampling rate, add sample_rate_hz = ... to its [[run]]")
-    cut = cut_raster(source.raster, rate, run.start_s, run.end_s)
+    raster, rate = axis.raster(source.raster, rate)
+    cut = cut_raster(raster, rate, run.start_s, run.end_s)
     if cut.n_samples == 0:
         length_s = source.raster.n_samples / rate
         end = "the end" if run.end_s is None else f"{run.end_s:g} s"
-        raise UnitError(f"no sample between {run.start_s or 0.0:g} s and {end}; the log holds {length_s:g} s of it")
+        begins = "" if raster is source.raster else f", from {raster.start_s:g} s on"
+        raise UnitError(
+            f"no sample between {run.start_s or 0.0:g} s and {end}; the log holds {length_s:g} s of it{begins}"
+        )
     component = channel.component
     if component is None and conversion.quantity == "sound_pressure":
         component = "air"
@@ -126,15 +162,15 @@ def _scaled(
         name=channel.name,
         quantity=conversion.quantity,
         si_symbol=conversion.si_symbol,
-        log_index=log_index,
-        column=column,
+        log_index=place[0],
+        column=place[1],
         sample_rate_hz=rate,
         start_sample=cut.start_sample,
         n_samples=cut.n_samples,
         start_s=cut.start_s,
         gain=conversion.gain,
         offset=conversion.offset,
-        scaling=conversion.scaling,
+        scaling="; ".join(part for part in (conversion.scaling, axis.words) if part),
         limits=conversion.limits(source.limits),
         component=component,
         drive=channel.drive,

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tdacoustic.campaign import CampaignRun
 from tdacoustic.measured.results import ChannelResult
+from tdacoustic.measured.run_sensors import CALIBRATION
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
 from tdacoustic.spectra import correct_for_background
@@ -34,7 +35,8 @@ class RunLevel:
 
     Levels are None where the quantity has none or the channel is not usable;
     `level_db`, `laeq_db` and `level_band_db` are corrected for background, each
-    by its own; `rms` is as measured.
+    by its own; `rms` is as measured. `calibration` is what calibrators before and
+    after say of the channel: ``"ok"`` or ``"doubtful"``, empty where there were none.
     """
 
     run: str
@@ -53,6 +55,7 @@ class RunLevel:
     level_band_db: float | None
     level_band_from_hz: float
     level_band_to_hz: float
+    calibration: str = ""
 
 
 @dataclass(frozen=True)
@@ -200,4 +203,10 @@ def _run_level(
         level_band_db=band,
         level_band_from_hz=result.level_band_hz[0],
         level_band_to_hz=result.level_band_hz[1],
+        calibration=_calibration(run, channel.name),
     )
+
+
+def _calibration(run: MeasuredRun, channel: str) -> str:
+    held = [item.verdict for item in run.verdicts if (item.channel, item.check) == (channel, CALIBRATION)]
+    return "" if not held else "ok" if set(held) == {"ok"} else "doubtful"

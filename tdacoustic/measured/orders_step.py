@@ -7,6 +7,7 @@ speed, no maps over it, but the time-synchronous average. Memory does not depend
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
@@ -50,6 +51,10 @@ FEWEST_TURNS: Final = 12.0
 """Below, a run says nothing about its orders [assumed]."""
 MOST_FOUND: Final = 12
 """Orders that nobody named, of all channels together."""
+SIDEBANDS: Final = 2
+"""Sidebands on each side of a carrier that a found order may be; further ones meet by chance [assumed]."""
+SAME_ORDER: Final = 0.25
+"""Part of the bandwidth by which a found order may miss a sideband and still be it [assumed]."""
 
 
 @dataclass(frozen=True)
@@ -309,15 +314,38 @@ def _span(first: Channel, angle: ShaftAngle, settings: OrderSettings, names: tup
 
 
 def _named(found: Sequence[float], settings: OrderSettings) -> list[NamedOrder]:
-    """Orders that nobody named, by their number; two that four digits do not tell apart have more."""
+    """Orders that nobody named: by the family whose sideband they are, else by their number.
+
+    Two numbers that four digits do not tell apart have more.
+    """
     taken = {order.name for order in settings.orders}
     named = []
     for order in found:
+        sideband = _sideband(order, settings)
         spellings = [f"order {order:.{digits}g}" for digits in (4, 6, 9)]
+        if sideband is not None and sideband[0] not in taken:
+            spellings, order = [sideband[0]], sideband[1]
         name = next((text for text in spellings if text not in taken), spellings[-1])
         taken.add(name)
         named.append(NamedOrder(name, "found", order, settings.shaft))
     return named
+
+
+def _sideband(order: float, settings: OrderSettings) -> tuple[str, float] | None:
+    """Name and exact order of the sideband that an order is: the nearest of the lowest number; None of none."""
+    carriers = {item.name: item.order for item in settings.orders if item.name in settings.carriers}
+    for number in range(1, SIDEBANDS + 1):
+        sidebands = [
+            (f"{name} {'+' if sign > 0 else '-'} {'' if number == 1 else f'{number} x '}{shaft}", exact)
+            for name, carrier in carriers.items()
+            for shaft, spacing in settings.spacings
+            for sign in (1, -1)
+            if (exact := carrier + sign * number * spacing) > 0.0
+        ]
+        name, exact = min(sidebands, key=lambda item: abs(item[1] - order), default=("", math.inf))
+        if abs(exact - order) <= SAME_ORDER * settings.bandwidth:
+            return name, exact
+    return None
 
 
 def _level_map(held: OrderMap, over: str, index: int) -> LevelMap:
@@ -352,4 +380,4 @@ def _fixed(
         return (), (f"resonances were not looked for: {error}",)
 
 
-ORDERS = Step("orders", 1, run_orders, "Orders over the angle of the shafts")
+ORDERS = Step("orders", 2, run_orders, "Orders over the angle of the shafts")

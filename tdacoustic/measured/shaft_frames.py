@@ -54,7 +54,7 @@ def plan_turn_frames(samples_per_turn: int, resolution: float, turns: float, ove
     return plan_line_frames(float(samples_per_turn), spacing, overlap=overlap)
 
 
-@dataclass
+@dataclass(eq=False)  # one is itself alone: arrays have no one truth of being equal
 class _Chain:
     """One stretch of the angle with what its samples go through."""
 

@@ -112,7 +112,8 @@ class AngleResampler:
     Orders up to `highest_order` pass within 0.01 dB, as long as they lie below 0.4 of the sampling rate; what would
     alias onto them is 80 dB down or more (the transition lies between 0.4 and 0.6 of the coarser density). The change
     of the speed over the 30 steps of a kernel is neglected. Values whose kernel reaches beyond the record, and those
-    where the angle is not known, are left out. At a crawl, below sampling rate / (8192 samples per turn) turns per
+    where the angle is not known, are left out; where the shaft slows down so fast that samples of a kernel are held no
+    more, the value is NaN. At a crawl, below sampling rate / (8192 samples per turn) turns per
     second, the low-pass stays as it is.
 
     Parameters
@@ -197,7 +198,15 @@ class AngleResampler:
             from tdacoustic.orders.kernels import resample_rows
 
             contiguous = np.ascontiguousarray(data, dtype=np.float64)
-            resample_rows(contiguous, positions[:ready], shares[:ready], *_kernel_table(), FINENESS, HALF_WIDTH, out)
+            held = np.flatnonzero(positions[:ready] >= reach[:ready])
+            # all, unless the shaft slows down so fast that a kernel would need samples that are held no more
+            part = out if held.size == ready else np.empty((data.shape[0], held.size))
+            if held.size:
+                kernel = (*_kernel_table(), FINENESS, HALF_WIDTH)
+                resample_rows(contiguous, positions[held], shares[held], *kernel, part)
+            if part is not out:
+                out[:] = np.nan
+                out[:, held] = part
         result = EvenBlock(self._next, float(self.samples_per_turn), out, times[:ready], speeds[:ready])
         self._next += ready
         self._hold(data, positions[ready:] - reach[ready:])

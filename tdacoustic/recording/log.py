@@ -92,6 +92,8 @@ class Log:
         What is odd about the file, one sentence each.
     metadata : tuple of (str, str)
         Further header fields worth showing.
+    companions : tuple of Path
+        Further files that the log consists of, in the log's own folder: its samples change where theirs do.
     """
 
     path: Path
@@ -101,3 +103,4 @@ class Log:
     start_time: str | None = None
     flags: tuple[str, ...] = ()
     metadata: tuple[tuple[str, str], ...] = ()
+    companions: tuple[Path, ...] = ()

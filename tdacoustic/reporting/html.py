@@ -43,6 +43,7 @@ from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
 from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
+from tdacoustic.tables.writing import csv_cell
 
 __all__ = ["MAX_FIGURE_BYTES", "MAX_INTERACTIVE", "csv_cell", "render_html", "safe_json"]
 
@@ -72,23 +73,6 @@ def safe_json(value: object) -> str:
     """
     text = json.dumps(value, separators=(",", ":"), allow_nan=False)
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
-
-
-def csv_cell(text: str) -> str:
-    """Make a text harmless that a spreadsheet would take for a formula; numbers stay numbers.
-
-    Examples
-    --------
-    >>> csv_cell("=cmd()"), csv_cell("-3.2"), csv_cell("mic_1")
-    ("'=cmd()", '-3.2', 'mic_1')
-    """
-    if not text.startswith(("=", "+", "-", "@", "\t", "\r", "\n")):
-        return text
-    try:
-        float(text)
-    except ValueError:
-        return "'" + text
-    return text
 
 
 @cache

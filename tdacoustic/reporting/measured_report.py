@@ -5,6 +5,7 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Fact, Notice, Section
 from tdacoustic.reporting.sections.answer import answer
+from tdacoustic.reporting.sections.clocks import clocks
 from tdacoustic.reporting.sections.contributions import contributions
 from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.levels import levels
@@ -14,6 +15,7 @@ from tdacoustic.reporting.sections.orders import orders
 from tdacoustic.reporting.sections.provenance import provenance
 from tdacoustic.reporting.sections.quality import quality
 from tdacoustic.reporting.sections.railway import railway
+from tdacoustic.reporting.sections.sensors import sensors
 from tdacoustic.reporting.sections.side_by_side import side_by_side
 from tdacoustic.reporting.sections.sources import sources
 from tdacoustic.reporting.sections.spectra import spectra
@@ -85,6 +87,8 @@ def measured_sections(analysis: Analysis) -> list[Section]:
         kinematics(analysis),
         speed(analysis),
         measured(analysis),
+        sensors(analysis),
+        clocks(analysis),
         quality(analysis),
     ]
     if len(analysis.tables["levels"]):

@@ -15,6 +15,8 @@ from tdacoustic.errors import AnalysisError
 from tdacoustic.fleet import Fleet
 from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.order_results import RunOrders
+from tdacoustic.measured.run_clocks import RunClocks
+from tdacoustic.measured.run_sensors import CampaignSensors
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.measured.tonality import Tonality
 from tdacoustic.railway import RailwayMeasures
@@ -72,6 +74,10 @@ class Analysis:
         Traction, braking and coasting at one speed; None where no runs can be compared.
     agreements : mapping of str to ConditionAgreement
         By condition, the kinds of evidence on its dominant source; empty without a second pass.
+    sensors : CampaignSensors
+        Scales from a sensor database and from calibrators, and what calibrators say of all scales.
+    clocks : mapping of str to RunClocks
+        By run of several logs, how their times lie on one axis.
 
     Examples
     --------
@@ -95,6 +101,8 @@ class Analysis:
     contributions: CampaignContributions | None = None
     modes: tuple[SpeedModes, ...] | None = None
     agreements: Mapping[str, ConditionAgreement] = field(default_factory=dict)
+    sensors: CampaignSensors = field(default_factory=CampaignSensors)
+    clocks: Mapping[str, RunClocks] = field(default_factory=dict)
 
     def result(self, run: str, channel: str) -> ChannelResult:
         """Return spectrum, levels and lines of a channel of a run.

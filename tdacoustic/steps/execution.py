@@ -88,7 +88,7 @@ def _input_names(name: str, value: Task | LogFile | tuple[LogFile, ...]) -> list
     if isinstance(value, Task):
         return [(name, value.key)]
     logs = value if isinstance(value, tuple) else (value,)
-    return [(name, f"sha256:{log.sha256}") for log in logs]
+    return [(name, f"sha256:{file.sha256}") for log in logs for file in log.files]
 
 
 def _ordered(tasks: Sequence[Task]) -> list[Task]:
@@ -227,6 +227,8 @@ def _in_processes(ledger: _Ledger, store: Store, jobs: int) -> None:
     context = multiprocessing.get_context("spawn")
     running: dict[Future[Any], Task] = {}
     others = set(multiprocessing.active_children())
+    # workers begin in the working directory, which may be a folder from outside: none of its modules are theirs
+    os.environ.setdefault("PYTHONSAFEPATH", "1")
     pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_start_worker)
     try:
         while True:

@@ -54,8 +54,8 @@ class Task:
     settings : dataclass
         All that the function reads besides its inputs.
     inputs : mapping of str to Task, LogFile or tuple of LogFile
-        Results of other tasks, and logs. A log enters the key by its sha256
-        alone, so a moved log is still the same log.
+        Results of other tasks, and logs. A log enters the key by its sha256 (of all its files, where it
+        consists of several) alone, so a moved log is still the same log.
     """
 
     step: Step
@@ -84,7 +84,7 @@ def _input_key(value: object) -> Any:
     if isinstance(value, Task):
         return value.key
     if isinstance(value, LogFile):
-        return f"sha256:{value.sha256}"
+        return value.key
     if isinstance(value, tuple):
         return [_input_key(item) for item in value]
     raise StoreError(f"a step's input must be a task or a log, got {type(value).__name__}")

@@ -16,7 +16,7 @@ COLUMNS: Final = MappingProxyType(
     {
         "quality": "run channel check verdict detail",
         "levels": "run condition train_speed_km_h channel component quantity rms level_db reference laeq_db "
-        "background_db correction si_unit level_band_db level_band_from_hz level_band_to_hz",
+        "background_db correction si_unit level_band_db level_band_from_hz level_band_to_hz calibration",
         "bands": "run condition channel band_hz level_db filter_dependent",
         "lines": "run condition channel component frequency_hz frequency_error_hz level_db prominence_db order "
         "family rms",
@@ -81,6 +81,12 @@ COLUMNS: Final = MappingProxyType(
         "high_db path_level_db verdict reason probability_largest n_states",
         "coherence": "run condition train_speed_km_h kind reference other frequency_hz span value corrected low high "
         "averages reason",
+        "sensors": "channel sensor run kind series calibrator wanted_hz frequency_hz read expected unit deviation_db "
+        "sensitivity_stated sensitivity_set drift_db sigma_db steadiness_db distortion_percent from_s to_s scale_from "
+        "calibrated_on due_on verdict reason",
+        "clocks": "run log reference_log method offset_s offset_error_s drift_ppm drift_error_ppm axis_error_samples "
+        "wander_s coherence peak_ratio band_from_hz band_to_hz overlap_from_s overlap_to_s windows windows_used "
+        "inverted doubt",
         "modes": "train_speed_km_h channel band mode level_db torque_share low high depends_on words motor_speed_rpm "
         "speed_level_db torque_level_db runs scatter_assumed",
         "dominance": "condition train_speed_km_h weighting dominant motor_share gearbox_share ambiguous_share "
@@ -108,6 +114,9 @@ TEXT_COLUMNS: Final = frozenset(
         *("shaft", "train_channel", "shaft_channel", "worst_event"),
         *("span", "part", "other", "band", "depends_on", "runs"),
         *("sensor_dominant", "order_dominant", "contribution_dominant"),
+        *("sensor", "calibrator", "sensitivity_stated", "sensitivity_set", "scale_from", "calibration"),
+        *("calibrated_on", "due_on"),
+        *("log", "reference_log", "doubt"),
         *("evidence_agreement", "evidence_source", "evidence_words"),
     }
 )

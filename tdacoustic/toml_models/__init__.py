@@ -11,7 +11,8 @@ from tdacoustic.toml_models.messages import (
     shown,
 )
 from tdacoustic.toml_models.names import MAX_NAME_LENGTH, Name, legal_name, name_problem, unique_name
-from tdacoustic.toml_models.reading import check_schema, file_or_inside, frozen, meta_lines, read_toml
+from tdacoustic.toml_models.paths import PathText, path_problem, small_file
+from tdacoustic.toml_models.reading import check_schema, file_or_inside, frozen, meta_lines, read_toml, steering_sign
 from tdacoustic.toml_models.values import NonNegative, Positive, Table, Text, each_once
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "TOP_LEVEL",
     "Name",
     "NonNegative",
+    "PathText",
     "Positive",
     "Table",
     "Text",
@@ -34,8 +36,11 @@ __all__ = [
     "meta_lines",
     "name_problem",
     "nearest",
+    "path_problem",
     "problem_words",
     "read_toml",
     "shown",
+    "small_file",
+    "steering_sign",
     "unique_name",
 ]

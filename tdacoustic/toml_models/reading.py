@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from tdacoustic.errors import MissingFileError, TdacousticError
 from tdacoustic.toml_models.messages import Vocabulary, shown
+from tdacoustic.toml_models.paths import small_file
 
-__all__ = ["check_schema", "file_or_inside", "frozen", "meta_lines", "read_toml"]
+__all__ = ["check_schema", "file_or_inside", "frozen", "meta_lines", "read_toml", "steering_sign"]
 
 
 def file_or_inside(path: Path, name: str) -> Path:
@@ -38,16 +39,17 @@ def read_toml(path: Path, error_type: type[TdacousticError]) -> dict[str, Any]:
     Raises
     ------
     error_type
-        It cannot be read or is no valid TOML; the message names line and column.
+        It cannot be read or is no valid TOML; the message names line and column. Or a text in it has a control
+        character or an override of the direction of writing.
     """
     try:
-        text = path.read_bytes().decode("utf-8-sig")  # Windows editors put a byte order mark
+        text = small_file(path, error_type).decode("utf-8-sig")  # Windows editors put a byte order mark
     except UnicodeDecodeError as error:
         raise error_type(f"{path}: is not UTF-8 (byte {error.start}: {error.reason})") from error
-    except OSError as error:
-        raise error_type(f"{path}: cannot be read ({error.strerror})") from error
     try:
-        return tomllib.loads(text)
+        tree = tomllib.loads(text)
+        _refuse_controls(path, tree, error_type)
+        return tree
     except tomllib.TOMLDecodeError as error:
         found = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
         reason = re.sub(r"\s*\(at .*\)$", "", str(error))
@@ -58,6 +60,36 @@ def read_toml(path: Path, error_type: type[TdacousticError]) -> dict[str, Any]:
         raise error_type(f"{path}: line {line}, column {column}: no valid TOML: {reason}: {shown(written)}") from error
     except (RecursionError, ValueError) as error:  # nested a thousand deep, a number of 5000 digits, a 13th month
         raise error_type(f"{path}: no valid TOML: {error}") from error
+
+
+def _refuse_controls(path: Path, tree: Any, error_type: type[TdacousticError], where: str = "") -> None:
+    """Raise where a text or a key has a sign that steers a terminal or turns the direction of writing."""
+    entries: Iterable[tuple[Any, Any]] = ()
+    if isinstance(tree, dict):
+        entries = tree.items()
+    elif isinstance(tree, list):
+        entries = enumerate(tree, 1)
+    for key, value in entries:
+        found = steering_sign(key) if isinstance(key, str) else None
+        found = found or (steering_sign(value) if isinstance(value, str) else None)
+        inside = f"{where}.{key}" if where else str(key)
+        if found is not None:
+            raise error_type(f"{path}: {inside!r} has the sign {found!a}, which no text here may have")
+        _refuse_controls(path, value, error_type, inside)
+
+
+def steering_sign(text: str) -> str | None:
+    r"""First sign of a text that steers a terminal, ends a string of C or turns the direction of writing.
+
+    Tabs and line breaks are none.
+
+    Examples
+    --------
+    >>> steering_sign("a\tb\r\n") is None, steering_sign("a\x1b[31m")
+    (True, '\x1b')
+    """
+    match = re.search("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x84\x86-\x9f\u202a-\u202e\u2066-\u2069]", text)
+    return None if match is None else match[0]
 
 
 def frozen(value: Any) -> Any:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from tdacoustic.measured.runs import MeasuredRun
     from tdacoustic.results import Analysis, LogInput
     from tdacoustic.steps import Record
+    from tdacoustic.workflows.groundwork import Groundwork
     from tdacoustic.workflows.runs import PreparedRun
     from tdacoustic.workflows.second_pass import FirstPass, SecondPass
 
@@ -63,6 +64,7 @@ def analyze(
         The campaign or its fleet is wrong, or (unless `without_runs`) no run can be used.
     """
     from tdacoustic.steps import execute, lineage, result_of
+    from tdacoustic.workflows.groundwork import lay_groundwork
     from tdacoustic.workflows.order_tracking import order_problems
     from tdacoustic.workflows.run_speeds import check_speeds, speed_problems
     from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems, written_inputs
@@ -71,7 +73,8 @@ def analyze(
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     fleet, problems = _fleet(campaign)
-    prepared = prepare_runs(campaign, store, without_runs)
+    ground = lay_groundwork(campaign, store, 1 if jobs is None else jobs, progress)
+    prepared = prepare_runs(campaign, store, without_runs, ground)
     tasks = {item.run.name: item.task for item in prepared if item.task is not None}
     n_jobs = _jobs(prepared) if jobs is None else jobs
     outcome = execute(list(tasks.values()), store, n_jobs, progress)
@@ -81,7 +84,7 @@ def analyze(
     by_name = {item.run.name: item for item in prepared}
     runs = check_speeds([gather_run(run, by_name.get(run.name), failures, store) for run in campaign.runs], fleet)
     evidence: dict[str, RunEvidence] = {}
-    records: dict[str, Record] = {}
+    records: dict[str, Record] = dict(ground.records)
     for name, task in tasks.items():
         if name not in failures:
             if by_name[name].evidence is not None:
@@ -91,9 +94,10 @@ def analyze(
     second = second_pass(first, store, n_jobs, progress) if deeper else SecondPass()
     records.update(second.records)
     problems += [*run_problems(prepared, failures), *speed_problems(campaign, prepared, runs)]
-    problems += [*_missing_receivers(campaign, runs), *_not_built(campaign), *(order_problems(first) if deeper else ())]
+    problems += [*_missing_receivers(campaign, runs), *ground.sensors.problems]
+    problems += order_problems(first) if deeper else ()
     inputs = (*written_inputs(campaign, fleet is not None), *log_inputs(prepared))
-    return _assemble(first, second, evidence, ([*problems, *second.problems], inputs, tuple(records.items())))
+    return _assemble(first, second, evidence, ground, ([*problems, *second.problems], inputs, tuple(records.items())))
 
 
 def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:
@@ -109,7 +113,7 @@ def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:
 
 
 def _jobs(prepared: Sequence[PreparedRun]) -> int:
-    n_bytes = sum(log.n_bytes for item in prepared for log in item.logs)
+    n_bytes = sum(file.n_bytes for item in prepared for log in item.logs for file in log.files)
     return 1 if n_bytes < PARALLEL_BYTES else (os.cpu_count() or 1)
 
 
@@ -129,22 +133,19 @@ def _missing_receivers(campaign: Campaign, runs: Sequence[MeasuredRun]) -> list[
     return []
 
 
-def _not_built(campaign: Campaign) -> list[str]:
-    """What the campaign asks for and this version does not do."""
-    found = []
-    calibrators = [run.name for run in campaign.runs if run.kind.startswith("calibration") and run.valid]
-    if calibrators:
-        found.append(f"calibrator runs {', '.join(calibrators)} are checked, but set no sensitivity in this version")
-    return found
-
-
 # ---------------------------------------------------------------- campaign
 
 Origins: TypeAlias = "tuple[list[str], tuple[LogInput, ...], tuple[tuple[str, Record], ...]]"
 """Problems, inputs and records."""
 
 
-def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEvidence], origins: Origins) -> Analysis:
+def _assemble(
+    first: FirstPass,
+    second: SecondPass,
+    evidence: Mapping[str, RunEvidence],
+    ground: Groundwork,
+    origins: Origins,
+) -> Analysis:
     """Gather what stands above the single run: background, conditions, sources, dominance, tables."""
     from tdacoustic.attribution import ConditionEvidence, attribute, dominance_of_condition
     from tdacoustic.attribution.kinds_of_evidence import agreement_of_condition
@@ -152,9 +153,11 @@ def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEv
     from tdacoustic.measured.runs import receivers
     from tdacoustic.results import Analysis
     from tdacoustic.tables import measured_tables
+    from tdacoustic.tables.clocks import clock_table
     from tdacoustic.tables.contributions import contribution_tables
     from tdacoustic.tables.orders import order_tables
     from tdacoustic.tables.railway import railway_table
+    from tdacoustic.tables.sensors import sensor_table
     from tdacoustic.tables.tones import tone_tables
     from tdacoustic.workflows.contributions import campaign_contributions, missing_components
     from tdacoustic.workflows.modes import campaign_modes
@@ -197,6 +200,8 @@ def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEv
         **speed_frames(runs, fleet, slips),
         **tone_tables(heard),
         **railway_table(railway),
+        **sensor_table(ground.sensors),
+        **clock_table(ground.clocks),
         **order_tables(runs, orders),
         **contribution_tables(contributions, modes),
     }
@@ -218,6 +223,8 @@ def _assemble(first: FirstPass, second: SecondPass, evidence: Mapping[str, RunEv
         contributions=contributions,
         modes=modes,
         agreements=agreements,
+        sensors=ground.sensors,
+        clocks=ground.clocks,
     )
 
 

@@ -9,21 +9,23 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+from uuid import uuid4
 
 from tdacoustic.campaign import SCHEMA, legal_name
 from tdacoustic.campaign.channels import Component
 from tdacoustic.errors import CampaignError, OutputError, UnitError
 from tdacoustic.formats import scan
 from tdacoustic.recording import Log, LogChannel
-from tdacoustic.toml_models import unique_name
+from tdacoustic.toml_models import path_problem, steering_sign, unique_name
 from tdacoustic.units import QUANTITY_SI_SYMBOL, parse_unit, quantity_of_unit
+from tdacoustic.workflows.init_calibrators import calibrator_run_lines, is_calibrator_log
+from tdacoustic.workflows.toml_text import toml_string
 
 __all__ = ["InitResult", "campaign_text", "make_campaign", "toml_string", "write_campaign"]
 
 _COMPONENTS: Final = " | ".join(Component.__args__)  # type: ignore[attr-defined]
 _SENSOR_SIGNALS: Final = ("V", "C")
 _SPEED_IN_NAME: Final = re.compile(r"(?:^|(?<=[_\- ]))(\d{1,3}(?:\.\d+)?)[_\- ]?km[_\-]?h(?![^\W_])", re.IGNORECASE)
-_ESCAPES: Final = {'"': '\\"', "\\": "\\\\", "\n": "\\n", "\r": "\\r", "\t": "\\t", "\b": "\\b", "\f": "\\f"}
 
 
 @dataclass(frozen=True)
@@ -49,28 +51,6 @@ class _Signal:
     name: str
     source: str | int
     said: tuple[LogChannel, ...]
-
-
-def toml_string(text: str) -> str:
-    r"""Return a text as a TOML basic string, on one line.
-
-    Raises
-    ------
-    CampaignError
-        The text has half a surrogate pair, as a file name that is no valid Unicode.
-
-    Examples
-    --------
-    >>> print(toml_string('Mic "A"\n'))
-    "Mic \"A\"\n"
-    """
-    if any(0xD800 <= ord(character) <= 0xDFFF for character in text):
-        raise CampaignError(f"{text!r} is no valid Unicode and cannot be written to a campaign; rename it")
-    escaped = (
-        _ESCAPES.get(c) or (f"\\u{ord(c):04X}" if ord(c) < 0x20 or 0x7F <= ord(c) <= 0x9F or c in "\u2028\u2029" else c)
-        for c in text
-    )
-    return f'"{"".join(escaped)}"'
 
 
 def make_campaign(log_paths: Sequence[str | Path], folder: str | Path) -> InitResult:
@@ -121,12 +101,15 @@ def write_campaign(
     if target.exists() and not overwrite:
         raise OutputError(f"{target}: is there already; give --overwrite or another -o")
     made = make_campaign(log_paths, target.parent)
-    temporary = target.with_name(".campaign.toml.partial")
+    # a name nobody can know before: a link of that name, in a folder from outside, would lead the writing elsewhere
+    temporary = target.with_name(f".campaign.toml.{uuid4().hex}.partial")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        temporary.write_bytes(made.text.encode("utf-8"))
+        with temporary.open("xb") as stream:
+            stream.write(made.text.encode("utf-8"))
         temporary.replace(target)
     except OSError as error:
+        temporary.unlink(missing_ok=True)
         raise OutputError(f"{target}: cannot be written ({error.strerror})") from error
     return target, made.missing
 
@@ -158,7 +141,7 @@ def campaign_text(logs: Sequence[Log], folder: str | Path) -> InitResult:
     missing: list[str] = []
     lines = [
         f"schema = {toml_string(SCHEMA)}",
-        f"name = {toml_string(Path(folder).absolute().name or 'campaign')}",
+        f"name = {toml_string(_name_of(Path(folder)))}",
         'origin = "measured"',
         '# fleet = "fleet.toml"   # the drive; without it sources stay unassigned',
         "",
@@ -169,17 +152,32 @@ def campaign_text(logs: Sequence[Log], folder: str | Path) -> InitResult:
     for signal in signals:
         lines += ["", *_channel_lines(signal, len(logs), missing)]
     lines += _difference_lines(logs, signals, missing)
-    for log, path, name in zip(logs, paths, _run_names(logs), strict=True):
-        lines += ["", *_run_lines(log, path, name, _has_speed(log), missing)]
+    of_calibrators = [is_calibrator_log(log.path.stem) for log in logs]
+    for log, path, name, held in zip(logs, paths, _run_names(logs), of_calibrators, strict=True):
+        if held and not all(of_calibrators):  # a campaign without any test is none
+            lines += ["", *calibrator_run_lines(log.path.stem, path, name, missing)]
+            lines += _rate_lines(log, name, missing)
+        else:
+            lines += ["", *_run_lines(log, path, name, _has_speed(log), missing)]
     return InitResult("\n".join(lines) + "\n", tuple(missing))
+
+
+def _name_of(folder: Path) -> str:
+    name = folder.absolute().name
+    return name if name.strip() and _can_be_written(name) else "campaign"
 
 
 def _relative(path: Path, folder: Path) -> str:
     try:
         # a folder behind a symbolic link has the parent of its target
-        return Path(os.path.relpath(path.parent.resolve() / path.name, folder.resolve())).as_posix()
+        text = Path(os.path.relpath(path.parent.resolve() / path.name, folder.resolve())).as_posix()
     except ValueError:  # another drive of Windows
-        return path.absolute().as_posix()
+        text = path.absolute().as_posix()
+    text = f"./{text}" if text.startswith("~") else text
+    problem = path_problem(text)
+    if problem is not None:
+        raise CampaignError(f"log {text!r} {problem}: a campaign cannot name it; rename it")
+    return text
 
 
 def _signals(logs: Sequence[Log]) -> list[_Signal]:
@@ -189,7 +187,7 @@ def _signals(logs: Sequence[Log]) -> list[_Signal]:
     for log in logs:
         for number, channel in enumerate(log.channels, 1):
             source: str | int = channel.name
-            if _bare(channel.name) in doubled or not channel.name.strip() or not _is_unicode(channel.name):
+            if _bare(channel.name) in doubled or not channel.name.strip() or not _can_be_written(channel.name):
                 source = number
             by_source.setdefault(source, []).append(channel)
     signals: list[_Signal] = []
@@ -206,8 +204,8 @@ def _bare(name: str) -> str:
     return name.removeprefix("/")
 
 
-def _is_unicode(text: str) -> bool:
-    return not any(0xD800 <= ord(character) <= 0xDFFF for character in text)
+def _can_be_written(text: str) -> bool:
+    return steering_sign(text) is None and not any(0xD800 <= ord(character) <= 0xDFFF for character in text)
 
 
 def _agreed_unit(signal: _Signal) -> str | None:
@@ -336,8 +334,12 @@ def _run_lines(log: Log, path: str, name: str, has_speed: bool, missing: list[st
         yield "# train_speed_km_h =   # MISSING: or motor_speed_rpm"
         missing.append(f"run {name!r}: train_speed_km_h or motor_speed_rpm")
     yield f"logs = [{toml_string(path)}]"
+    yield from _rate_lines(log, name, missing)
+    if log.start_time is not None:
+        yield f"# began {toml_string(log.start_time)}"
+
+
+def _rate_lines(log: Log, name: str, missing: list[str]) -> Iterator[str]:
     if any(channel.raster.sample_rate_hz is None for channel in log.channels):
         yield "# sample_rate_hz =   # MISSING: the log does not say"
         missing.append(f"run {name!r}: sample_rate_hz")
-    if log.start_time is not None:
-        yield f"# began {toml_string(log.start_time)}"

@@ -117,9 +117,9 @@ class OutputFolder:
             held = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return None
-        return (
-            held if isinstance(held, dict) and str(held.get("schema", "")).startswith("tdacoustic-manifest/") else None
-        )
+        if not isinstance(held, dict) or not str(held.get("schema", "")).startswith("tdacoustic-manifest/"):
+            return None
+        return held if isinstance(held.get("files"), dict) else {**held, "files": {}}
 
     def __enter__(self) -> OutputFolder:
         try:

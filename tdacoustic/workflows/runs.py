@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from tdacoustic.attribution import EVIDENCE, EvidenceSettings
 from tdacoustic.campaign import Campaign, CampaignRun, WrittenPath
-from tdacoustic.errors import TdacousticError
+from tdacoustic.errors import CampaignError, TdacousticError
 from tdacoustic.formats import scan
 from tdacoustic.ingest import Bound, bind_run, check_coverage
 from tdacoustic.measured import FrameSettings, MeasurementSettings, measurement_task
@@ -18,6 +18,7 @@ from tdacoustic.quality import Verdict
 from tdacoustic.recording import Channel, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+from tdacoustic.workflows.groundwork import Groundwork, lay_groundwork
 from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ class PreparedRun:
         What is odd about its logs.
     no_lines : str or None
         Why its speed cannot be read from lines, where it would have to be.
+    verdicts : tuple of Verdict
+        What is known of it and its channels before anything is computed.
     """
 
     run: CampaignRun
@@ -62,6 +65,7 @@ class PreparedRun:
     error: TdacousticError | None = None
     flags: tuple[str, ...] = ()
     no_lines: str | None = None
+    verdicts: tuple[Verdict, ...] = ()
 
     @property
     def task(self) -> Task | None:
@@ -69,8 +73,19 @@ class PreparedRun:
         return self.evidence or self.measurement
 
 
-def prepare_runs(campaign: Campaign, store: Store, without_runs: bool = False) -> tuple[PreparedRun, ...]:
+def prepare_runs(
+    campaign: Campaign, store: Store, without_runs: bool = False, groundwork: Groundwork | None = None
+) -> tuple[PreparedRun, ...]:
     """Scan and hash the logs of all valid runs, bind their channels and make their tasks.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    store : Store
+    without_runs : bool
+        Go on where no run can be read.
+    groundwork : Groundwork, optional
+        Default: it is laid here.
 
     Raises
     ------
@@ -78,8 +93,9 @@ def prepare_runs(campaign: Campaign, store: Store, without_runs: bool = False) -
         No run can be read (unless `without_runs`), or a channel can be used in no run.
     """
     fleet = fleet_of(campaign) if campaign.analysis.speed_from != "channels" else None
-    prepared = [_prepare(campaign, run, store, fleet) for run in campaign.runs if run.valid]
-    _check_coverage(campaign, prepared, without_runs)
+    ground = groundwork or lay_groundwork(campaign, store)
+    prepared = [_prepare(campaign, run, store, fleet, ground) for run in campaign.runs if run.valid]
+    _check_coverage(campaign, prepared, without_runs, ground.sensors.problems)
     bound = [item.bound.recording for item in prepared if item.bound is not None]
     microphones = receivers_of(bound)
     return tuple(replace(item, evidence=_evidence(item, microphones)) for item in prepared)
@@ -102,12 +118,18 @@ def _sensors(recording: Recording) -> tuple[tuple[str, str], ...]:
     return tuple((channel.name, str(channel.component)) for channel in recording.channels if is_sensor(channel))
 
 
-def _prepare(campaign: Campaign, run: CampaignRun, store: Store, fleet: Fleet | None) -> PreparedRun:
+def _prepare(
+    campaign: Campaign, run: CampaignRun, store: Store, fleet: Fleet | None, ground: Groundwork
+) -> PreparedRun:
     """Scan and hash a run's logs, bind its channels, make its task."""
     try:
         scanned = tuple(scan(log.path) for log in run.logs)
-        bound = bind_run(campaign.channels, run, scanned)
-        logs = tuple(log_file(log.path, store) for log in run.logs)
+        if run.name in ground.failed:
+            raise ground.failed[run.name]
+        clocks = ground.clocks.get(run.name)
+        axes = None if clocks is None else clocks.axes
+        bound = bind_run(campaign.channels, run, scanned, ground.sensors.of_run(run.name), axes)
+        logs = tuple(log_file(log.path, store, log.companions) for log in scanned)
     except TdacousticError as error:
         return PreparedRun(run, error=error)
     analysis = campaign.analysis
@@ -126,7 +148,8 @@ def _prepare(campaign: Campaign, run: CampaignRun, store: Store, fleet: Fleet | 
     task = measurement_task(f"run {run.name}", settings, frames, logs, None if isinstance(lines, str) else lines)
     flags = [f"{log.path.name}: {flag}" for log in scanned for flag in log.flags]
     flags += [warning for warning in bound.warnings if not warning.startswith("channel ")]
-    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags), no_lines=no_lines)
+    verdicts = (*ground.sensors.verdicts.get(run.name, ()), *(clocks.verdicts if clocks is not None else ()))
+    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags), no_lines=no_lines, verdicts=verdicts)
 
 
 def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
@@ -138,8 +161,10 @@ def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
     return tuple(stated)
 
 
-def _check_coverage(campaign: Campaign, prepared: Sequence[PreparedRun], without_runs: bool) -> None:
-    """Raise where nothing can be used, or where a channel can be used in no run."""
+def _check_coverage(
+    campaign: Campaign, prepared: Sequence[PreparedRun], without_runs: bool, problems: Sequence[str]
+) -> None:
+    """Raise where nothing can be used, or where a channel can be used in no run; with what calibrators did not tell."""
     if not prepared:
         return
     errors = [item.error for item in prepared if item.error is not None]
@@ -148,7 +173,10 @@ def _check_coverage(campaign: Campaign, prepared: Sequence[PreparedRun], without
             return
         first = errors[0]
         raise type(first)("\n".join(dict.fromkeys(str(error) for error in errors))) from first
-    check_coverage([item.bound for item in prepared if item.bound is not None], campaign.channels)
+    try:
+        check_coverage([item.bound for item in prepared if item.bound is not None], campaign.channels)
+    except CampaignError as error:
+        raise CampaignError("\n".join((str(error), *problems))) from error
 
 
 def gather_run(
@@ -164,7 +192,7 @@ def gather_run(
     if error is not None or prepared.bound is None or prepared.measurement is None:
         return MeasuredRun(run, None, None, (Verdict("", "run", "bad", f"cannot be used: {_words(run, error)}"),))
     measurement = result_of(prepared.measurement, store)
-    verdicts = [Verdict("", "log", "warning", flag) for flag in prepared.flags]
+    verdicts = [*prepared.verdicts, *(Verdict("", "log", "warning", flag) for flag in prepared.flags)]
     if prepared.no_lines is not None:
         verdicts.append(Verdict("", "speed", "warning", f"not read from lines: {prepared.no_lines}"))
     measured = MeasuredRun(run, prepared.bound.recording, measurement, tuple(verdicts))
@@ -199,6 +227,8 @@ def written_inputs(campaign: Campaign, with_fleet: bool) -> tuple[LogInput, ...]
     files = [(campaign.path.name, campaign.path, "campaign")]
     if campaign.run_table is not None:
         files.append((campaign.run_table.text, campaign.run_table.path, "runs"))
+    if campaign.sensor_table is not None:
+        files.append((campaign.sensor_table.text, campaign.sensor_table.path, "sensors"))
     found = [_input(*file) for file in files]
     if campaign.fleet is not None and with_fleet:
         found.append(fleet_input(campaign.fleet, "fleet"))
@@ -222,4 +252,16 @@ def log_inputs(prepared: Sequence[PreparedRun]) -> tuple[LogInput, ...]:
         if item.bound is not None:
             for written, log, file in zip(item.run.logs, item.bound.recording.logs, item.logs, strict=True):
                 found[written.text] = LogInput(written.text, file.sha256, file.n_bytes, log.format)
+                for companion in file.companions:
+                    text = _beside(written.text, companion.path.relative_to(log.path.parent).as_posix())
+                    found[text] = LogInput(text, companion.sha256, companion.n_bytes, log.format)
     return tuple(found.values())
+
+
+def _beside(written: str, name: str) -> str:
+    """Write a file of a log's folder as the campaign writes the log.
+
+    >>> _beside("logs/a.atfx", "a.bin")
+    'logs/a.bin'
+    """
+    return written[: max(written.rfind("/"), written.rfind("\\")) + 1] + name

@@ -1,8 +1,14 @@
 """HDF5: the documented layout, foreign files, trust, truncation."""
 
+import os
+import shutil
+import subprocess
+import sys
+
 import h5py
 import numpy as np
 import pytest
+from faults_hdf5 import foreign_filter
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats import scan
@@ -241,3 +247,29 @@ def test_no_channels(path):
         file["text"] = "hello"
     with pytest.raises(FormatError, match="no numeric dataset"):
         scan(path)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+@pytest.mark.parametrize("told", ["HDF5_PLUGIN_PATH", "nothing"])
+def test_no_program_is_loaded_from_a_folder_of_plugins(tmp_path, told):
+    """A filter with the number 32015 lies where HDF5 looks for it, and leaves a mark when it is loaded."""
+    source = tmp_path / "filter.c"
+    source.write_text(
+        "#include <stdio.h>\n#include <stdlib.h>\n__attribute__((constructor)) static void loaded(void)\n"
+        '{ FILE *mark = fopen(getenv("MARK"), "w"); if (mark) fclose(mark); }\n'
+        "int H5PLget_plugin_type(void) { return 0; }\nconst void *H5PLget_plugin_info(void) { return 0; }\n"
+    )
+    plugins = tmp_path / "plugins"
+    plugins.mkdir()
+    subprocess.run(["cc", "-shared", "-fPIC", "-o", plugins / "libfilter.so", source], check=True)
+    log = foreign_filter(tmp_path)
+    environment = {**os.environ, "HDF5_PLUGIN_PATH": str(plugins), "MARK": str(tmp_path / "mark")}
+    code = (
+        "import h5py, sys\nwith h5py.File(sys.argv[1]) as f:\n    try: f['packed'][:]\n    except OSError: pass\n"
+        if told == "nothing"
+        else "import sys\nfrom tdacoustic.formats import scan\nlog = scan(sys.argv[1])\n"
+        "assert [c.name for c in log.channels] == ['mic'], log\n"
+        "list(log.reader.blocks([0], 0, 600, 100))\n"
+    )
+    subprocess.run([sys.executable, "-c", code, str(log)], env=environment, check=True)
+    assert (tmp_path / "mark").exists() == (told == "nothing")  # without us it is loaded: the test can fail

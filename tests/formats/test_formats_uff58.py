@@ -259,3 +259,48 @@ def test_damaged_values_and_headers(log_of):
 def test_no_data_set_58(log_of):
     with pytest.raises(FormatError, match="no data set 58"):
         log_of(b"    -1\n   151\nmodel\n    -1\n")
+
+
+@pytest.mark.parametrize("columns_of", ["bytes", "characters"])
+@pytest.mark.parametrize("filled", [67, 80])
+def test_a_unit_behind_a_label_in_utf_8(log_of, columns_of, filled):
+    blob = uff_binary(X, ordinate=(12, "Beschl", b"mm/s2"))
+    label, unit = "Größe in µm", "µm/s²"
+    if columns_of == "bytes":
+        fields = label.encode().ljust(20) + b" " + unit.encode().ljust(20)
+        line = (f"{12:10d}{0:5d}{0:5d}{0:5d} ".encode() + fields).ljust(filled)
+    else:
+        line = f"{12:10d}{0:5d}{0:5d}{0:5d} {label:<20} {unit:<20}".ljust(filled).encode()
+    lines = blob.split(b"\n", 12)
+    lines[10] = line
+    (channel,) = log_of(b"\n".join(lines)).channels
+    assert channel.unit == unit
+
+
+def test_a_name_that_is_longer_than_its_field_moves_the_node(log_of):
+    log = log_of(uff_ascii(X[:9], entity="PF-I-0301y+", node=17) + uff_ascii(X[:9], entity="PF-I-0301y+", node=18))
+    assert [channel.name for channel in log.channels] == ["PF-I-0301y+:17:", "PF-I-0301y+:18:"]
+
+
+@pytest.mark.parametrize("closing", [b"    -1\n", b"\n    -1\n", b"\r\n    -1\r\n"])
+@pytest.mark.parametrize("dtype", ["<f4", ">f8"])
+def test_binary_records_as_pyuff_reads_them(log_of, tmp_path, closing, dtype):
+    log = log_of(uff_binary(X, dtype, closing=closing))
+    assert np.array_equal(values(log), pyuff.UFF(str(tmp_path / "log.uff")).read_sets()["data"][: len(X)])
+
+
+def test_more_records_than_a_process_may_open_files(log_of):
+    log = log_of(b"".join(uff_binary(X[:5], entity=f"c{i}") for i in range(1500)))
+    (block,) = log.reader.blocks(range(1500), 0, 5, 100)
+    assert block.shape == (1500, 5) and np.array_equal(block[1499], X[:5].astype("<f4"))
+
+
+@pytest.mark.parametrize(("kind", "exponents", "flagged"), [(11, (0, 0), True), (1, (1, 0), True), (1, (0, 0), False)])
+def test_units_of_data_set_164_by_the_exponents_of_the_ordinate(log_of, kind, exponents, flagged):
+    factors = "".join(f"{factor:25.17E}" for factor in (1000.0, 1000.0, 1.0))
+    units = f"    -1\n   164\n         5mm (milli newton)            2\n{factors}\n    -1\n".encode()
+    blob = uff_binary(X, ordinate=(kind, "v", b"m/s"))
+    lines = blob.split(b"\n", 12)
+    lines[10] = lines[10][:10] + f"{exponents[0]:5d}{exponents[1]:5d}".encode() + lines[10][20:]
+    (channel,) = log_of(units + b"\n".join(lines)).channels
+    assert channel.unit == "m/s" and bool(channel.flags) == flagged

@@ -287,6 +287,22 @@ def test_a_thinned_track_holds_no_more_than_it_keeps():
     assert all(array.base is None and array.shape[-1] == 20 for array in arrays)
 
 
+def test_stretches_of_a_long_run_are_left_as_they_end(monkeypatch):
+    """Whatever the blocks: a stretch that has ended before the log does is put away, and stops nothing."""
+    recording = recording_of(signal(), RUN.rate_hz, "acceleration")
+    breaks = ((8.0, 8.5), (30.0, 30.5))
+    times, turns = RUN.nodes()
+    known = ~np.any([(times > first + 1e-9) & (times < last - 1e-9) for first, last in breaks], axis=0)
+    speed = RunSpeed((), (), (ShaftAngle(times[known], turns[known], shaft="motor", channel="n", breaks=breaks),))
+    whole = orders_of(monkeypatch, recording, speed, vold_kalman=False)
+    monkeypatch.setattr(orders_step, "BLOCK_BYTES", 8 * 8192)
+    cut = orders_of(monkeypatch, recording, speed, vold_kalman=False)
+    for one, other in zip(whole.channels[0].levels, cut.channels[0].levels, strict=True):
+        np.testing.assert_allclose(other.mean_square, one.mean_square, rtol=1e-9)
+    mesh = cut.channels[0].levels[0]
+    assert np.nanmax(np.abs(10.0 * np.log10(mesh.mean_square))) < 0.2
+
+
 def test_orders_that_four_digits_do_not_tell_apart_have_names_of_their_own():
     settings = orders_step.OrderSettings(
         channels=(), steady=False, teller="n", turns_per_unit=1.0, shaft="motor", counted=True, ratios=(), orders=(),

@@ -98,6 +98,24 @@ def test_memory_does_not_grow_while_waiting_for_the_angle():
     assert resampler._data.shape[1] < 20000
 
 
+@pytest.mark.parametrize("size", [500, 3000, 8192, 20000])
+def test_a_shaft_that_all_but_stops_gives_the_same_whatever_the_blocks_or_nothing(size):
+    """Its kernels grow from one block to the next by more than is held: such a value is none, never a wrong one."""
+    rate = 8192.0
+    nodes = np.concatenate((np.arange(0.0, 5.0, 0.05), np.arange(5.0, 12.0, 0.05)))
+    speed = np.where(nodes < 5.0, 20.0, np.maximum(20.0 * np.exp(-(nodes - 5.0) / 0.3), 0.02))
+    turns = np.concatenate(([0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(nodes))))
+    samples = np.random.default_rng(4).standard_normal((1, int(12.0 * rate)))
+
+    def read(block):
+        return AngleResampler(ShaftAngle(nodes, turns), rate, 10.0).signal(samples, block)
+
+    whole, cut = read(samples.shape[1]), read(size)
+    known = np.isfinite(cut.values[0])
+    assert np.max(np.abs(cut.values[0][known] - whole.values[0][known])) < 1e-6  # places are rounded in each block anew
+    assert known[cut.times_s < 5.0].all()
+
+
 def test_a_record_without_common_time_is_refused():
     angle = ShaftAngle([100.0, 101.0, 102.0], [0.0, 20.0, 40.0], "motor")
     with pytest.raises(

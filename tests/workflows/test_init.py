@@ -189,3 +189,14 @@ def test_real_logs_go_through_without_an_edit(tmp_path, log, symbols):
     found = bind_run(campaign.channels, run, [scan(log.path) for log in run.logs])
     assert (found.refused, found.warnings) == ((), ())
     assert [channel.si_symbol for channel in found.recording.channels] == symbols
+
+
+def test_a_file_named_after_a_calibrator_is_proposed_as_such(tmp_path):
+    names = ("cal_mic.h5", "run_1.h5", "Kalibrierung nachher.h5", "vertical.h5")
+    result = campaign_text([made_log(tmp_path / name, MIC) for name in names], tmp_path)
+    runs = loaded(result, tmp_path).runs
+    assert [run.kind for run in runs] == ["calibration_before", "test", "calibration_after", "test"]
+    assert runs[0].calibrator is None and '# calibrator = "94 dB"   # MISSING' in result.text
+    assert "run 'cal_mic': calibrator, what it gives (the file's name says that it is one)" in result.missing
+    alone = loaded(campaign_text([made_log(tmp_path / "cal.h5", MIC)], tmp_path), tmp_path)
+    assert alone.runs[0].kind == "test"  # a campaign has at least one

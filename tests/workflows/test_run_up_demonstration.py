@@ -51,6 +51,11 @@ def test_the_mesh_order_over_the_run_up_is_the_gearbox(tables):
     assert len(gearbox) >= 5 and (gearbox["verdict"] == "ok").all() and (gearbox["probability_largest"] > 0.95).all()
 
 
+def test_sidebands_that_nobody_named_are_named_by_their_family(tables):
+    rows = tables["orders"].query("run == 'run-up'").drop_duplicates("name").set_index("name")
+    assert rows.loc["mesh x1 - motor shaft", "order"] == 30.0 and rows.loc["mesh x1 + motor shaft", "order"] == 32.0
+
+
 def test_slip_and_its_time(tables, recipe, conformance):
     (put_in,) = recipe["condition"][0]["slip"]
     row = tables["slip"].set_index("run").loc["run-up"]

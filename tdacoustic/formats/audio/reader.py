@@ -175,6 +175,7 @@ def _scan_wave(path: Path) -> Log:
     header = read_wave_header(path)
     subtype = _subtype(header)
     if subtype is None:
+        _refuse_contradiction(path, header)
         reader = _library_reader(path, header)
         bits = None
     else:
@@ -210,6 +211,15 @@ def _scan_wave(path: Path) -> Log:
 def _subtype(header: WaveHeader) -> str | None:
     width, rest = divmod(header.block_align, header.n_channels)
     return None if rest else SUBTYPES.get((header.format_tag, width))
+
+
+def _refuse_contradiction(path: Path, header: WaveHeader) -> None:
+    """Raise where an encoding of fixed size has samples of another: the library would pick one of both."""
+    if header.format_tag in {tag for tag, _ in SUBTYPES}:
+        raise FormatError(
+            f"{path}: damaged fmt chunk: {header.n_channels} channels of {header.bits} bits cannot take "
+            f"{header.block_align} bytes a sample of all channels"
+        )
 
 
 def _library_reader(path: Path, header: WaveHeader) -> AudioReader:

@@ -18,6 +18,8 @@ __all__ = ["WHITESPACE", "Layout", "is_number", "read_layout", "split_row"]
 WHITESPACE = " "
 HEAD_BYTES = 1 << 20
 SAMPLE_LINES = 50
+SAMPLE_CELLS = 50_000
+MAX_FIELDS = 10_000
 MAX_METADATA = 100
 CANDIDATES = tuple((delimiter, decimal) for delimiter in "\t;|, " for decimal in ".,")
 """Delimiter and decimal mark, the likelier first; both can be a comma where the numbers stand in quotes."""
@@ -144,9 +146,20 @@ def read_layout(path: Path) -> Layout:
     )
 
 
+def _sample(path: Path, lines: Sequence[str]) -> list[str]:
+    """Last lines of the beginning, fewer of them where they have many fields."""
+    sample = [line for line in lines if line.strip()][-SAMPLE_LINES:]
+    marks = [max(line.count(mark) for mark in "\t;|,") for line in sample]
+    words = [len(line.split(maxsplit=MAX_FIELDS)) for line in sample]
+    most = max([*marks, *words], default=0)
+    if most >= MAX_FIELDS:
+        raise FormatError(f"{path}: more than {MAX_FIELDS} columns")
+    return sample[-max(5, SAMPLE_CELLS // (most + 1)) :]
+
+
 def _dialect(path: Path, lines: Sequence[str]) -> tuple[str, str, int, tuple[bool, ...]]:
     """Delimiter, decimal mark, number of fields, and which of them hold numbers."""
-    sample = [line for line in lines if line.strip()][-SAMPLE_LINES:]
+    sample = _sample(path, lines)
     best: tuple[tuple[float, ...], str, str, int, tuple[bool, ...]] | None = None
     for priority, (delimiter, decimal) in enumerate(CANDIDATES):
         if delimiter == decimal and not any('"' in line for line in sample):

@@ -2,8 +2,8 @@
 
 Encoding, delimiter, decimal mark and heading are found out
 (`tdacoustic.formats.delimited.layout`), the rows are counted and checked in one pass
-over the bytes (`rows`), a time column gives the raster and is checked while
-the rows are read (`time_column`). The numbers are parsed by pandas' C engine.
+over the bytes (`rows`), those of a large text without one and checked while they are read (`placing`); a time column
+gives the raster and is checked while the rows are read (`time_column`). The numbers are parsed by pandas' C engine.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import csv
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import check_request, rebuffered, unique_names
 from tdacoustic.formats.delimited.layout import WHITESPACE, Layout, is_number, read_layout, split_row
+from tdacoustic.formats.delimited.placing import open_checked, place_rows
 from tdacoustic.formats.delimited.rows import Rows, count_rows
 from tdacoustic.formats.delimited.stream import decoded, open_text_bytes
 from tdacoustic.formats.delimited.time_column import (
@@ -122,7 +123,7 @@ class DelimitedReader:
         position = start
         try:
             with (
-                open_text_bytes(self.path, layout.encoding, offset) as stream,
+                self._opened(checkpoint, offset) as stream,
                 pandas.read_csv(
                     stream,
                     **_dialect_options(layout),
@@ -152,6 +153,11 @@ class DelimitedReader:
             raise self._bad_cell(needed, moments, position, error) from error
         if position != stop:
             raise FormatError(f"{self.path}: the file ends at row {position}, {stop} were asked for: it has changed")
+
+    def _opened(self, row: int, offset: int) -> BinaryIO:
+        if self.rows.checked:
+            return open_text_bytes(self.path, self.layout.encoding, offset)
+        return open_checked(self.path, self.layout, row, offset)
 
     def _bad_cell(self, fields: Sequence[int], moments: set[int], row: int, error: Exception) -> FormatError:
         """Find the cell over which pandas stumbled, at or after a row."""
@@ -202,7 +208,7 @@ def scan_file(path: Path) -> Log:
         No rows of numbers, rows of different length, a text among numbers, or times that are not equidistant.
     """
     layout = read_layout(path)
-    rows = count_rows(path, layout)
+    rows = place_rows(path, layout) or count_rows(path, layout)
     claimed = claimed_rows(layout)
     if claimed is not None and claimed > rows.n_rows:
         raise FormatError(f"{path}: truncated: the heading claims {claimed} samples, the file holds {rows.n_rows}")

@@ -11,7 +11,7 @@ from tdacoustic.errors import FormatError
 from tdacoustic.formats.delimited.layout import WHITESPACE, Layout
 from tdacoustic.formats.delimited.stream import open_text_bytes
 
-__all__ = ["Rows", "count_rows"]
+__all__ = ["RowChecker", "Rows", "count_rows"]
 
 CHUNK_BYTES = 4 << 20
 MAX_LINE_BYTES = 16 << 20
@@ -28,11 +28,14 @@ class Rows:
     checkpoints : tuple of (int, int)
         Row and byte offset, ascending; begins with the first row.
     ends_in_newline : bool
+    checked : bool
+        Whether each row is known to have all its fields.
     """
 
     n_rows: int
     checkpoints: tuple[tuple[int, int], ...]
     ends_in_newline: bool
+    checked: bool = True
 
     def before(self, row: int) -> tuple[int, int]:
         """Last checkpoint at or before a row."""
@@ -49,9 +52,9 @@ def count_rows(path: Path, layout: Layout) -> Rows:
     Raises
     ------
     FormatError
-        A row with too few or too many fields, or an empty line among the rows; names the line.
+        A row with too few or too many fields, an empty line among the rows, a quote that is not closed; names the line.
     """
-    counter = _Counter(path, layout)
+    counter = RowChecker(path, layout)
     carry = b""
     ends_in_newline = True
     with open_text_bytes(path, layout.encoding, layout.offset) as stream:
@@ -71,12 +74,20 @@ def count_rows(path: Path, layout: Layout) -> Rows:
     return Rows(counter.rows, tuple(counter.checkpoints), ends_in_newline)
 
 
-class _Counter:
-    """Counts rows in pieces of whole lines."""
+class RowChecker:
+    """Counts rows in pieces of whole lines, and refuses one that has not all its fields.
 
-    def __init__(self, path: Path, layout: Layout) -> None:
+    Parameters
+    ----------
+    path : Path
+    layout : Layout
+    row, offset : int or None
+        Of the first line; None is that of the text.
+    """
+
+    def __init__(self, path: Path, layout: Layout, row: int = 0, offset: int | None = None) -> None:
         self.path, self.layout = path, layout
-        self.rows, self.offset = 0, layout.offset
+        self.rows, self.offset = row, layout.offset if offset is None else offset
         self.checkpoints: list[tuple[int, int]] = [(0, layout.offset)]
         self._blank_pending = False
         self._strip = b"\r\n " if layout.delimiter == "\t" else b"\r\n\t "
@@ -91,6 +102,8 @@ class _Counter:
             if self.rows and self._seekable:
                 self.checkpoints.append((self.rows, self.offset))
             n_rows = content.count(b"\n") + 1
+            if self.layout.quoted and b'"' in content:
+                self._refuse_open_quote(content)
             if not self._fields_are_right(content):
                 self._refuse(content)
             self.rows += n_rows
@@ -111,6 +124,16 @@ class _Counter:
         ends = marks == LF
         rows, rest = divmod(len(marks) + 1, period)
         return rest == 0 and int(np.count_nonzero(ends)) == rows - 1 and bool(ends[period - 1 :: period].all())
+
+    def _refuse_open_quote(self, content: bytes) -> None:
+        """Raise where a line opens a quote and does not close it: all that follows would be one cell."""
+        codes = np.frombuffer(content, np.uint8)
+        total = np.concatenate([[0], np.cumsum(codes == QUOTE)])
+        ends = np.append(np.flatnonzero(codes == LF), len(codes))
+        odd = np.flatnonzero(np.diff(total[ends], prepend=0) % 2)
+        if odd.size:
+            line = self.layout.first_line + self.rows + int(odd[0])
+            raise FormatError(f"{self.path}: line {line}: a quote is opened and not closed")
 
     def _refuse(self, content: bytes) -> None:
         fields = _fields(content, self.layout)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,8 @@ INTERVAL_NAMES = frozenset(
     {"dt", "dts", "deltat", "wfincrement", "samplinginterval", "samplingintervals", "timestep", "timesteps"}
 )
 MAX_TEXT = 1000
+MAX_ATTRIBUTE_BYTES = 1 << 20
+MAX_ATTRIBUTES = 1000
 
 
 def _plain(name: str) -> str:
@@ -56,6 +59,8 @@ class Attributes:
         try:
             stored = attributes.get_id(name)
             if stored.dtype.kind not in "iufSUO" or math.prod(stored.shape or (1,)) != 1:
+                return None
+            if stored.dtype.itemsize > MAX_ATTRIBUTE_BYTES:
                 return None
             value = attributes[name]
         except (OSError, TypeError, ValueError, KeyError, RuntimeError):
@@ -95,7 +100,7 @@ class Attributes:
         """
         owner = self._owner
         while True:
-            for name in owner.attrs:
+            for name in islice(owner.attrs, MAX_ATTRIBUTES):
                 plain = _plain(name)
                 number = _number(Attributes(owner)._value(name)) if plain in RATE_NAMES | INTERVAL_NAMES else None
                 if number is None:

@@ -16,7 +16,8 @@ dataset or on the groups above it. An equidistant dataset called ``time`` or ``t
 gives its neighbours of the same length their rate.
 
 Nothing is read from outside the file: soft and external links, virtual datasets
-and external storage are skipped with a flag.
+and external storage are skipped with a flag. No filter is loaded from a folder of
+plugins, and what a dataset claims is held against what is stored for it.
 """
 
 from __future__ import annotations
@@ -32,12 +33,14 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import check_request, rebuffered
+from tdacoustic.formats.bounds import MAX_CHANNELS
+from tdacoustic.formats.hdf5 import guard
 from tdacoustic.formats.hdf5.attributes import Attributes
 from tdacoustic.formats.hdf5.tree import Tree, read_tree
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import QUANTITIES, quantity_of_unit
 
-__all__ = ["Hdf5Reader", "Source", "scan_file"]
+__all__ = ["Hdf5Reader", "Source", "forbid_plugins", "opened", "scan_file", "scan_here"]
 
 SCHEMA = "tdacoustic-log/1"
 SLAB_BYTES = 8 << 20
@@ -70,11 +73,23 @@ class Source:
     offset: float = 0.0
 
 
+def forbid_plugins() -> None:
+    """Take away the folders in which HDF5 looks for filters: what a file names there would be loaded and run.
+
+    For the whole process; a filter that its program has registered with the library itself is still used.
+    """
+    import h5py
+
+    while h5py.h5pl.size():
+        h5py.h5pl.remove(0)
+
+
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def opened(path: Path) -> Iterator[Any]:
     """Open the file, and turn what h5py raises into one clear error."""
     import h5py
 
+    forbid_plugins()
     try:
         with h5py.File(path, "r", locking="best-effort") as file:
             yield file
@@ -106,7 +121,7 @@ class Hdf5Reader:
         rows: dict[str, list[int]] = {}
         for row, source in enumerate(chosen):
             rows.setdefault(source.dataset, []).append(row)
-        with _opened(self.path) as file:
+        with opened(self.path) as file:
             parts = [
                 rebuffered(self._slabs(file, [chosen[row] for row in members], start, stop, len(rows)), block_size)
                 for members in rows.values()
@@ -115,8 +130,10 @@ class Hdf5Reader:
                 yield from parts[0]
                 return
             order = np.argsort([row for members in rows.values() for row in members])
+            as_asked = bool((order == np.arange(order.size)).all())
             for pieces in zip(*parts, strict=True):
-                yield np.concatenate(pieces)[order]
+                joined = np.concatenate(pieces)
+                yield joined if as_asked else joined[order]
 
     def _slabs(
         self, file: Any, sources: Sequence[Source], start: int, stop: int, n_datasets: int
@@ -175,7 +192,13 @@ def scan_file(path: Path) -> Log:
     FormatError
         Truncated, damaged, or without any dataset that could be a channel.
     """
-    with _opened(path) as file:
+    guard.examine(path, "hdf5")
+    return scan_here(path)
+
+
+def scan_here(path: Path) -> Log:
+    """Do what `scan_file` does, in this process and without a guard."""
+    with opened(path) as file:
         tree = read_tree(file)
         root = Attributes(file)
         schema = root.text("schema")
@@ -184,11 +207,14 @@ def scan_file(path: Path) -> Log:
         if schema is not None and schema.startswith("tdacoustic-log/") and not ours:
             flags.append(f"schema is {schema!r}; this version knows {SCHEMA!r}")
         times = {} if ours else _time_vectors(file, tree, flags)
+        vectors = {vector for vector, _, _, _ in times.values()}
         channels: list[LogChannel] = []
         sources: list[Source] = []
         for name in tree.datasets:
-            if name not in {vector for vector, _, _, _ in times.values()}:
+            if name not in vectors:
                 _add(path, file, name, times, ours, channels, sources)
+            if len(channels) > MAX_CHANNELS:
+                raise FormatError(f"{path}: more than {MAX_CHANNELS} channels")
         if not channels:
             reasons = "; ".join(flags) or "no dataset in it"
             raise FormatError(f"{path}: no numeric dataset of one or two dimensions ({reasons})")
@@ -212,13 +238,14 @@ def _time_vectors(file: Any, tree: Tree, flags: list[str]) -> TimeVectors:
     from tdacoustic.formats.hdf5.tree import raster_of_time_vector
 
     found: TimeVectors = {}
+    lengths: dict[tuple[str, int], int] = {}
     for name in tree.datasets:
-        group = name.rpartition("/")[0]
-        siblings = [other for other in tree.datasets if other != name and other.rpartition("/")[0] == group]
-        dataset = file[name]
-        if not siblings or dataset.ndim != 1 or (group, len(dataset)) in found:
-            continue
-        if not any(len(dataset) in file[other].shape for other in siblings):
+        for length in set(file[name].shape):
+            key = (name.rpartition("/")[0], length)
+            lengths[key] = lengths.get(key, 0) + 1
+    for name in tree.datasets:
+        group, dataset = name.rpartition("/")[0], file[name]
+        if dataset.ndim != 1 or (group, len(dataset)) in found or lengths[(group, len(dataset))] < 2:
             continue
         raster = raster_of_time_vector(name, dataset)
         if raster is None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,10 +12,20 @@ import numpy as np
 from tdacoustic.formats.hdf5.attributes import Attributes
 from tdacoustic.formats.rates import snap_rate
 
-__all__ = ["Tree", "raster_of_time_vector", "read_tree"]
+__all__ = ["MAX_COLUMNS", "TIME_NAMES", "Tree", "raster_of_time_vector", "read_tree", "reason_to_skip", "skipped_flags"]
 
 MAX_COLUMNS = 1024
 MAX_OBJECTS = 100_000
+MAX_DEPTH = 32
+MAX_CHUNK_BYTES = 256 << 20
+"""A chunk is unpacked whole, whatever is asked of it."""
+
+MAX_UNPACKING = 2000
+"""Bytes that a stored byte may stand for; deflate makes at most 1032 of one."""
+
+ALWAYS_ALLOWED_BYTES = 64 << 20
+"""A dataset of no more than this is read however little of it is stored."""
+
 NAMES_IN_A_FLAG = 5
 TIME_NAMES = frozenset({"time", "t", "times", "time_s", "t_s", "zeit", "temps", "timestamps", "time_axis"})
 SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
@@ -28,12 +40,15 @@ class Tree:
     flags: tuple[str, ...]
 
 
-def read_tree(file: Any) -> Tree:
+def read_tree(file: Any, leave_out: Callable[[str, Any], str | None] | None = None) -> Tree:
     """Walk a file's hard links.
 
     Parameters
     ----------
     file : h5py.File
+    leave_out : callable, optional
+        Given the name and the object of a group or a dataset: why it is left out, "" where that is not worth a flag,
+        None where it is not. Without it, `reason_to_skip` of datasets.
 
     Returns
     -------
@@ -54,7 +69,7 @@ def read_tree(file: Any) -> Tree:
             count += 1
             if count > MAX_OBJECTS:
                 return Tree(
-                    tuple(datasets), (*_flags(skipped), f"more than {MAX_OBJECTS} objects: the rest is not read")
+                    tuple(datasets), (*skipped_flags(skipped), f"more than {MAX_OBJECTS} objects: the rest is not read")
                 )
             if not isinstance(group.get(key, getlink=True), h5py.HardLink):
                 skipped.setdefault("are links and were not followed", []).append(name)
@@ -65,19 +80,27 @@ def read_tree(file: Any) -> Tree:
                 skipped.setdefault("are second names of what was read already", []).append(name)
                 continue
             seen.add(address)
-            if isinstance(item, h5py.Group):
-                below.append((f"{name}/", item))
+            left_out = None if leave_out is None else leave_out(name, item)
+            if left_out is not None:
+                if left_out:
+                    skipped.setdefault(left_out, []).append(name)
+            elif isinstance(item, h5py.Group):
+                if name.count("/") >= MAX_DEPTH:
+                    skipped.setdefault(f"are nested more than {MAX_DEPTH} deep", []).append(name)
+                else:
+                    below.append((f"{name}/", item))
             elif isinstance(item, h5py.Dataset):
-                reason = _reason_to_skip(item)
+                reason = reason_to_skip(item) if leave_out is None else None
                 if reason is None:
                     datasets.append(name)
                 else:
                     skipped.setdefault(reason, []).append(name)
         pending.extend(reversed(below))
-    return Tree(tuple(datasets), _flags(skipped))
+    return Tree(tuple(datasets), skipped_flags(skipped))
 
 
-def _flags(skipped: dict[str, list[str]]) -> tuple[str, ...]:
+def skipped_flags(skipped: dict[str, list[str]]) -> tuple[str, ...]:
+    """One sentence for each reason why something was left out: reason -> names."""
     flags = []
     for reason, names in skipped.items():
         shown = ", ".join(names[:NAMES_IN_A_FLAG]) + (", ..." if len(names) > NAMES_IN_A_FLAG else "")
@@ -85,7 +108,7 @@ def _flags(skipped: dict[str, list[str]]) -> tuple[str, ...]:
     return tuple(flags)
 
 
-def _reason_to_skip(dataset: Any) -> str | None:
+def reason_to_skip(dataset: Any) -> str | None:
     """Why a dataset can be no channel, None if it can."""
     if dataset.is_virtual:
         return "are virtual: their data lie in other files"
@@ -101,6 +124,26 @@ def _reason_to_skip(dataset: Any) -> str | None:
         return "have fewer than two samples"
     if dataset.ndim == 2 and min(dataset.shape) > MAX_COLUMNS:
         return f"are matrices of more than {MAX_COLUMNS} columns"
+    return _reason_of_packing(dataset)
+
+
+def _reason_of_packing(dataset: Any) -> str | None:
+    """Why a dataset cannot be unpacked within bounds and with what HDF5 itself has, None if it can."""
+    import h5py
+
+    layout = dataset.id.get_create_plist()
+    for index in range(layout.get_nfilters()):
+        code = layout.get_filter(index)[0]
+        if not h5py.h5z.filter_avail(code):
+            return (
+                f"are packed with filter {code}, which is not part of HDF5, and no program is loaded for it; "
+                "repack them with h5repack -f GZIP=4"
+            )
+    if dataset.chunks and math.prod(dataset.chunks) * dataset.dtype.itemsize > MAX_CHUNK_BYTES:
+        return f"have chunks of more than {MAX_CHUNK_BYTES >> 20} MiB"
+    claimed = math.prod(dataset.shape) * dataset.dtype.itemsize
+    if claimed > max(ALWAYS_ALLOWED_BYTES, MAX_UNPACKING * int(dataset.id.get_storage_size())):
+        return "claim more than the bytes stored for them can hold"
     return None
 
 

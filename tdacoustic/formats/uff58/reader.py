@@ -8,7 +8,7 @@ flag, and refused where nothing else is in the file.
 
 from __future__ import annotations
 
-import re
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,20 +17,22 @@ from typing import BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from tdacoustic.errors import FormatError
+from tdacoustic.errors import FormatError, UnitError
 from tdacoustic.formats.blocks import check_request, rebuffered, unique_names
 from tdacoustic.formats.rates import snap_rate
+from tdacoustic.formats.uff58.binary import behind_values, binary_values
 from tdacoustic.formats.uff58.records import (
     Header58,
     Record,
     find_terminator,
     parse_header,
     read_identifier,
+    read_units,
     start_time_of,
 )
-from tdacoustic.formats.uff58.values import AsciiValues, BinaryValues, LooseValues, count_loose_values
+from tdacoustic.formats.uff58.values import SLAB_VALUES, AsciiValues, LooseValues, Values, count_loose_values
 from tdacoustic.recording import Log, LogChannel, Raster
-from tdacoustic.units import quantity_of_unit
+from tdacoustic.units import parse_unit, quantity_of_unit
 
 __all__ = ["UffReader", "scan_file"]
 
@@ -52,9 +54,12 @@ REAL_SINGLE, REAL_DOUBLE = 2, 4
 SECONDS = {"s": 1.0, "sec": 1.0, "seconds": 1.0, "second": 1.0, "ms": 1e-3, "us": 1e-6}
 QUANTITY_OF_TYPE = {12: "acceleration", 13: "force", 19: "speed", 11: "other"}
 DIRECTIONS = {0: "", 1: "+X", 2: "+Y", 3: "+Z", -1: "-X", -2: "-Y", -3: "-Z"}
-SEARCH_BYTES = 1 << 16
-
-Values = BinaryValues | AsciiValues | LooseValues
+EXPONENTS_OF_TYPE = {
+    **{2: (-2, 1), 6: (1, 1), 8: (1, 0), 9: (0, 1), 11: (1, 0), 12: (1, 0), 13: (0, 1), 15: (-2, 1)},
+}
+"""Exponents of length and force of a specific data type (table of addendum A); of others they stand in the record."""
+MAX_VALUES_AT_ONCE = 1 << 22
+"""Values that the pieces of all records that are read together may have."""
 
 
 @dataclass(frozen=True)
@@ -74,24 +79,27 @@ class UffReader:
             The file ends before `stop`, or a value is no number.
         """
         check_request(self.path, min((self.n_values[column] for column in columns), default=0), start, stop, block_size)
-        parts = [
-            rebuffered(
-                (piece[np.newaxis] for piece in self.values[column].pieces(self.path, start, stop)),
-                block_size,
-            )
-            for column in columns
-        ]
-        for rows in zip(*parts, strict=True):
-            yield rows[0] if len(rows) == 1 else np.concatenate(rows)
+        slab = max(1 << 12, min(SLAB_VALUES, MAX_VALUES_AT_ONCE // max(1, len(columns))))
+        with self.path.open("rb") as stream:
+            parts = [
+                rebuffered(
+                    (piece[np.newaxis] for piece in self.values[column].pieces(self.path, stream, start, stop, slab)),
+                    block_size,
+                )
+                for column in columns
+            ]
+            for rows in zip(*parts, strict=True):
+                yield rows[0] if len(rows) == 1 else np.concatenate(rows)
 
 
 @dataclass(frozen=True)
 class _Found:
-    """A time record."""
+    """A time record, and the factors of length and force of the data set 164 before it."""
 
     header: Header58
     values: Values
     flags: tuple[str, ...]
+    units: tuple[float, float] | None
 
 
 def scan_file(path: Path) -> Log:
@@ -110,15 +118,18 @@ def scan_file(path: Path) -> Log:
     left_out: list[str] = []
     flags: list[str] = []
     position = 0
+    units: tuple[float, float] | None = None
     with path.open("rb") as stream:
         size = path.stat().st_size
         index = 0
         while (record := read_identifier(path, stream, position)) is not None:
             index += 1
+            if record.number == 164:
+                units = read_units(stream, record)
             if record.number != 58:
                 position = _skip(path, stream, record, size, index, flags)
                 continue
-            position = _read_58(path, stream, record, size, index, found, left_out, flags)
+            position = _read_58(path, stream, record, size, index, units, found, left_out, flags)
     if not found:
         reasons = "; ".join(left_out) or "no data set 58 in it"
         raise FormatError(f"{path}: no time signal: {reasons}")
@@ -163,6 +174,7 @@ def _read_58(
     record: Record,
     size: int,
     index: int,
+    units: tuple[float, float] | None,
     found: list[_Found],
     left_out: list[str],
     flags: list[str],
@@ -171,17 +183,18 @@ def _read_58(
     header, offset = parse_header(path, stream, record, index)
     label = f"record {index} ({header.entity or header.id_lines[0]!r})"
     reason = _reason_to_leave_out(header)
+    values: Values
     if record.binary:
-        values, position, notes = _binary(path, stream, record, header, offset, size, label)
+        values, position, notes = binary_values(path, stream, record, header, offset, size, label)
     elif reason is None:
         values, position, notes = _ascii(path, stream, header, offset, size, label)
     else:
         left_out.append(f"{label} is left out: {reason}")
         return _skip(path, stream, record, size, index, flags)
-    if reason is not None or values is None:
+    if reason is not None:
         left_out.append(f"{label} is left out: {reason}")
     else:
-        found.append(_Found(header, values, tuple(notes)))
+        found.append(_Found(header, values, tuple(notes), units))
     return position
 
 
@@ -210,70 +223,6 @@ def _reason_to_leave_out(header: Header58) -> str | None:
     return None
 
 
-def _binary(
-    path: Path, stream: BinaryIO, record: Record, header: Header58, offset: int, size: int, label: str
-) -> tuple[Values | None, int, list[str]]:
-    """Values of a 58b record, the offset behind it, and what is odd about it."""
-    if record.float_format != 2:
-        raise FormatError(f"{path}: {label}: float format {record.float_format} is not IEEE 754 (2) and cannot be read")
-    if record.byte_order not in (1, 2):
-        raise FormatError(f"{path}: {label}: byte order must be 1 or 2, got {record.byte_order}")
-    notes: list[str] = []
-    width = 8 if header.data_type in (REAL_DOUBLE, 6) else 4
-    per_value = (1 if header.even else 2) * (2 if header.data_type in (5, 6) else 1)
-    n_bytes = header.n_values * width * per_value
-    if record.n_bytes != n_bytes:
-        other = 12 - width
-        if record.n_bytes == header.n_values * other * per_value:
-            notes.append(f"the type of its values says {width} bytes, their number {other}: {other} are taken")
-            width, n_bytes = other, record.n_bytes
-        elif 0 < record.n_bytes < n_bytes:
-            raise FormatError(
-                f"{path}: {label} claims {header.n_values} values, "
-                f"but {record.n_bytes} bytes for them instead of {n_bytes}"
-            )
-        else:
-            notes.append(f"it claims {record.n_bytes} bytes for {header.n_values} values of {width} bytes")
-    if offset + n_bytes > size:
-        held = max(0, size - offset) // (width * per_value)
-        raise FormatError(f"{path}: truncated: {label} claims {header.n_values} values, the file holds {held}")
-    behind = _behind_values(stream, offset + n_bytes, size)
-    doubled = _behind_values(stream, offset + 2 * n_bytes, size) if behind is None and width == 4 else None
-    if doubled is not None and offset + 2 * n_bytes <= size:
-        notes.append("it says single precision but holds twice the bytes: read as double precision")
-        width, behind = 8, doubled
-    if behind is None:
-        end = find_terminator(stream, offset + n_bytes)
-        stray = (size if end is None else end[0]) - offset - n_bytes
-        notes.append(f"{stray} bytes that belong to nothing follow its values")
-        behind = (size, False) if end is None else (end[1], True)
-    if not behind[1]:
-        notes.append("it has no closing -1")
-    values = BinaryValues(offset, ("<" if record.byte_order == 1 else ">") + f"f{width}")
-    return values, behind[0], notes
-
-
-def _behind_values(stream: BinaryIO, position: int, size: int) -> tuple[int, bool] | None:
-    """Offset behind a record whose values end at `position`, and whether it was closed.
-
-    The closing ``-1`` may be glued to the values, on a line of its own, or absent.
-    None where something else stands there.
-    """
-    if position > size:
-        return None
-    stream.seek(position)
-    text = stream.read(SEARCH_BYTES)
-    if not text.strip():
-        return size, False
-    closing = re.match(rb"\s*-1(?:[ \t]*(?:\r?\n|\Z)|(?=[ \t]+-1))", text)
-    if closing is None:
-        return None
-    following = re.match(rb"\s*(\S+)", text[closing.end() :])
-    if following is None or following[1] == b"-1":
-        return position + closing.end(), True
-    return position, False
-
-
 def _ascii(
     path: Path, stream: BinaryIO, header: Header58, offset: int, size: int, label: str
 ) -> tuple[Values, int, list[str]]:
@@ -291,7 +240,7 @@ def _ascii(
     in_last = header.n_values - (n_lines - 1) * per_line
     values_end = offset + (n_lines - 1) * len(first) + in_last * width
     if values_end <= size and len(text) >= per_line * width:
-        behind = _behind_values(stream, values_end, size)
+        behind = behind_values(stream, values_end, size)
         stream.seek(values_end - in_last * width - 1)
         if behind is not None and stream.read(1) == b"\n":
             notes = [] if behind[1] else ["it has no closing -1: the file may have been cut off behind it"]
@@ -342,13 +291,47 @@ def _channel(item: _Found, name: str, name_flag: str | None) -> LogChannel:
         factor = 0.0
     elif not header.abscissa_step > 0.0:
         flags.append(f"its abscissa increment is {header.abscissa_step}: the sampling rate is not known")
+    elif not 0.0 < 1.0 / (header.abscissa_step * factor or math.inf) < math.inf:
+        flags.append(f"its abscissa increment of {header.abscissa_step} is no sampling interval: the rate is not known")
     else:
         rate, raw = snap_rate(1.0 / (header.abscissa_step * factor), header.step_resolution)
+    start = header.abscissa_start * factor
+    if not math.isfinite(start):
+        flags.append(f"its abscissa begins at {header.abscissa_start}: its start is taken as 0")
+        start = 0.0
     unit = header.ordinate.unit
+    flags += _unit_flags(header, item.units)
     return LogChannel(
         name,
-        Raster(rate, header.n_values, header.abscissa_start * factor, raw),
+        Raster(rate, header.n_values, start, raw),
         unit=unit,
         quantity=quantity_of_unit(unit) or QUANTITY_OF_TYPE.get(header.ordinate.data_type),
         flags=tuple(flags),
     )
+
+
+def _unit_flags(header: Header58, units: tuple[float, float] | None) -> list[str]:
+    """Say where data set 164 contradicts the ordinate's unit, or states other units than SI where there is none.
+
+    The label of an axis takes precedence over the file's units (note to record 8 of data set 58).
+    """
+    if units is None:
+        return []
+    length, force = EXPONENTS_OF_TYPE.get(header.ordinate.data_type, header.ordinate.exponents[:2])
+    if (length, force) == (0, 0) or max(abs(length), abs(force)) > 9:
+        return []
+    stated = units[0] ** -length * units[1] ** -force
+    unit = header.ordinate.unit
+    if unit is None:
+        same = math.isclose(stated, 1.0, rel_tol=1e-4)
+        return [] if same else [f"it names no unit; data set 164 says that its numbers are in {stated:.6g} times SI"]
+    try:
+        known = parse_unit(unit)
+    except UnitError:
+        return []
+    if known.si_symbol in ("V", "A", "C", "1") or math.isclose(stated, known.factor, rel_tol=1e-4):
+        return []
+    return [
+        f"its unit is {unit!r}, data set 164 says that its numbers are in {stated:.6g} times SI: the unit of its own "
+        "label is taken"
+    ]

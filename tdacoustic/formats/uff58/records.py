@@ -6,19 +6,34 @@ Layout after the *Universal Dataset Number 58* and *58b* pages of UC-SDRL
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
+from itertools import islice
 from pathlib import Path
 from typing import BinaryIO
 
 from tdacoustic.errors import FormatError
 
-__all__ = ["Axis", "Header58", "Record", "find_terminator", "parse_header", "read_identifier", "start_time_of"]
+__all__ = [
+    "Axis",
+    "Header58",
+    "Record",
+    "find_terminator",
+    "parse_header",
+    "read_identifier",
+    "read_units",
+    "start_time_of",
+]
 
 MAX_LINE = 4096
+LINE = 80
+LENGTHS = (67, LINE)
+"""Of a line of an axis: up to its last field, or filled with blanks."""
 HEADER_LINES = 11
+MAX_HEADER_LINES = 100
 WINDOW = 1 << 20
 TERMINATOR = re.compile(rb"(?m)^[ \t]*-1[ \t]*\r?(?=\n|\Z)")
 ENGLISH_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
@@ -52,9 +67,10 @@ class Record:
 
 @dataclass(frozen=True)
 class Axis:
-    """Specific data type, label and unit of an axis (records 8 to 11)."""
+    """Specific data type, exponents of length, force and temperature, label and unit of an axis (records 8 to 11)."""
 
     data_type: int
+    exponents: tuple[int, int, int]
     label: str | None
     unit: str | None
 
@@ -121,6 +137,8 @@ def read_identifier(path: Path, stream: BinaryIO, position: int) -> Record | Non
         if not text:
             continue
         if not opened:
+            if text.split(b"\r")[0].strip() == b"-1" != text:
+                raise FormatError(f"{path}: its lines end in CR alone, which is not read; convert them to LF or CR LF")
             if text != b"-1":
                 raise FormatError(f"{path}: no record begins at byte {position}: {text[:20]!r} instead of '-1'")
             opened = True
@@ -132,6 +150,8 @@ def read_identifier(path: Path, stream: BinaryIO, position: int) -> Record | Non
             raise FormatError(f"{path}: the record at byte {position} has no data set number: {text[:20]!r}")
         fields = [int(field) for field in match[3].split()[:4] if field.isdigit()] if match[2] else []
         fields += [0] * (4 - len(fields))
+        if fields[2] > MAX_HEADER_LINES:
+            raise FormatError(f"{path}: the record at byte {position} claims {fields[2]} header lines")
         return Record(int(match[1]), bool(match[2]), fields[0], fields[1], fields[2], fields[3], behind)
     if opened:
         raise FormatError(f"{path}: truncated: the file ends where a record begins, at byte {position}")
@@ -164,20 +184,51 @@ def find_terminator(stream: BinaryIO, position: int) -> tuple[int, int, int] | N
 
 
 def _decode(raw: bytes) -> str:
+    """Text of a line, UTF-8 or else Latin-1, with its fields in their columns.
+
+    A writer may count the columns of UTF-8 in characters or in bytes; a line whose length in bytes is one of
+    `LENGTHS` tells. There each character is followed by a null for each further byte of it.
+    """
     try:
-        return raw.decode("utf-8")
+        text = raw.decode("utf-8")
     except UnicodeDecodeError:
         return raw.decode("latin-1")
+    if len(raw) in LENGTHS and len(text) not in LENGTHS:
+        return "".join(character + "\x00" * (len(character.encode()) - 1) for character in text)
+    return text
 
 
 def _said(text: str) -> str | None:
-    text = text.strip("\x00 \t\r\n")
+    text = text.replace("\x00", "").strip(" \t\r\n")
     return None if text.upper() in ("", "NONE") else text
 
 
+def _integer(text: str) -> int:
+    """Whole number of a field; an empty field is 0, as Fortran reads it."""
+    text = text.strip()
+    if not re.fullmatch(r"[+-]?\d+|", text, re.ASCII):
+        raise ValueError(f"{text!r} is no whole number")
+    return int(text or 0)
+
+
 def _axis(line: str) -> Axis:
-    line = line.ljust(80)
-    return Axis(int(line[:10] or 0), _said(line[26:46]), _said(line[47:67]))
+    line = line.ljust(LINE)
+    try:
+        exponents = (_integer(line[10:15]), _integer(line[15:20]), _integer(line[20:25]))
+    except ValueError:
+        exponents = (0, 0, 0)
+    return Axis(_integer(line[:10]), exponents, _said(line[26:46]), _said(line[47:67]))
+
+
+def _degrees_of_freedom(line: str) -> tuple[str | None, int, int]:
+    """Response entity, node and direction; a name of more than its ten columns moves the others to the right."""
+    word = re.match(r"\S{11,}", line[31:])
+    longer = len(word[0]) - 10 if word is not None else 0
+    try:
+        node, direction = _integer(line[41 + longer : 51 + longer]), _integer(line[51 + longer : 55 + longer])
+    except ValueError:
+        node, direction = 0, 0
+    return _said(line[31 : 41 + longer]), node, direction
 
 
 def _resolution(text: str) -> float:
@@ -189,10 +240,12 @@ def _resolution(text: str) -> float:
     mantissa = re.split("[eEdD]", text.strip())[0]
     decimals = len(mantissa.partition(".")[2])
     value = abs(float(mantissa)) if mantissa not in ("", "-", "+") else 0.0
-    return 0.5 * 10.0**-decimals / value if value else 0.0
+    return 0.5 * 10.0**-decimals / value if value and math.isfinite(value) else 0.0
 
 
 def _number(text: str) -> float:
+    if "_" in text or not text.isascii():
+        raise ValueError(f"{text!r} is no number")
     return float(text.strip().replace("D", "E").replace("d", "e") or 0.0)
 
 
@@ -221,17 +274,18 @@ def parse_header(path: Path, stream: BinaryIO, record: Record, index: int) -> tu
     if len(lines) < HEADER_LINES or not line.endswith(b"\n"):
         raise FormatError(f"{path}: truncated: the file ends in the header of record {index}")
     try:
-        dof, form = lines[5].ljust(80), lines[6].ljust(80)
+        dof, form = lines[5].ljust(LINE), lines[6].ljust(LINE)
         step = form[43:56]
+        entity, node, direction = _degrees_of_freedom(dof)
         header = Header58(
-            id_lines=tuple(line.strip() for line in lines[:5]),
-            function_type=int(dof[:5]),
-            entity=_said(dof[31:41]),
-            node=int(dof[41:51].strip() or 0),
-            direction=int(dof[51:55].strip() or 0),
-            data_type=int(form[:10]),
-            n_values=int(form[10:20]),
-            even=int(form[20:30]) != 0,
+            id_lines=tuple(line.replace("\x00", "").strip() for line in lines[:5]),
+            function_type=_integer(dof[:5]),
+            entity=entity,
+            node=node,
+            direction=direction,
+            data_type=_integer(form[:10]),
+            n_values=_integer(form[10:20]),
+            even=_integer(form[20:30]) != 0,
             abscissa_start=_number(form[30:43]),
             abscissa_step=_number(step),
             step_resolution=_resolution(step),
@@ -243,6 +297,25 @@ def parse_header(path: Path, stream: BinaryIO, record: Record, index: int) -> tu
     if header.n_values < 0:
         raise FormatError(f"{path}: record {index} claims {header.n_values} values")
     return header, position
+
+
+def read_units(stream: BinaryIO, record: Record) -> tuple[float, float] | None:
+    """Read the factors of length and force of a data set 164: numbers in the file divided by them are in SI.
+
+    Returns
+    -------
+    (float, float) or None
+        None where they are not there or make no sense.
+    """
+    stream.seek(record.body)
+    lines = [line for line, _ in islice(_lines(stream), 2)]
+    text = lines[1].decode("latin-1").rstrip("\r\n") if len(lines) == 2 else ""
+    try:
+        length, force = _number(text[:25]), _number(text[25:50])
+    except ValueError:
+        return None
+    sensible = all(math.isfinite(factor) and factor > 0.0 for factor in (length, force))
+    return (length, force) if sensible else None
 
 
 def start_time_of(text: str) -> str | None:

@@ -6,19 +6,40 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 
-__all__ = ["AsciiValues", "BinaryValues", "LooseValues", "count_loose_values", "parse_fixed"]
+__all__ = ["AsciiValues", "BinaryValues", "LooseValues", "Values", "count_loose_values", "parse_fixed"]
 
 SLAB_VALUES = 1 << 18
 LF, ZERO, NINE, MINUS, PLUS, BLANK, POINT = (ord(character) for character in "\n09-+ .")
 EXACT_POWERS = 10.0 ** np.arange(23)
 LOOSE_NUMBER = re.compile(rb"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eEdD][+-]?\d+)?|[+-]?nan|[+-]?inf(?:inity)?", re.IGNORECASE)
+
+
+class Values(Protocol):
+    """Where the values of a record are."""
+
+    def pieces(
+        self, path: Path, stream: BinaryIO, start: int, stop: int, slab: int = SLAB_VALUES
+    ) -> Iterator[NDArray[np.float64]]:
+        """Yield the values from `start` to `stop`, in pieces of any length.
+
+        Parameters
+        ----------
+        path : Path
+            For messages.
+        stream : BinaryIO
+            The file; others may move it between two pieces.
+        start, stop : int
+        slab : int
+            About how many values a piece may have.
+        """
+        ...
 
 
 @dataclass(frozen=True)
@@ -28,8 +49,10 @@ class BinaryValues:
     offset: int
     dtype: str
 
-    def pieces(self, path: Path, start: int, stop: int) -> Iterator[NDArray[np.float64]]:
-        """Yield the values from `start` to `stop`, in pieces of any length.
+    def pieces(
+        self, path: Path, stream: BinaryIO, start: int, stop: int, slab: int = SLAB_VALUES
+    ) -> Iterator[NDArray[np.float64]]:
+        """Yield the values from `start` to `stop`, in pieces of any length; see `Values`.
 
         Raises
         ------
@@ -37,14 +60,15 @@ class BinaryValues:
             The file ends before `stop`.
         """
         width = np.dtype(self.dtype).itemsize
-        with path.open("rb") as stream:
-            stream.seek(self.offset + start * width)
-            for first in range(start, stop, SLAB_VALUES):
-                wanted = min(SLAB_VALUES, stop - first)
-                raw = stream.read(wanted * width)
-                if len(raw) != wanted * width:
-                    raise FormatError(f"{path}: truncated: the file ends at value {first + len(raw) // width}")
-                yield np.frombuffer(raw, self.dtype).astype(np.float64)
+        for first in range(start, stop, slab):
+            wanted = min(slab, stop - first)
+            stream.seek(self.offset + first * width)
+            raw = stream.read(wanted * width)
+            if len(raw) != wanted * width:
+                raise FormatError(f"{path}: truncated: the file ends at value {first + len(raw) // width}")
+            with np.errstate(invalid="ignore"):  # a signalling NaN becomes a quiet one
+                values = np.frombuffer(raw, self.dtype).astype(np.float64)
+            yield values
 
 
 @dataclass(frozen=True)
@@ -56,22 +80,23 @@ class AsciiValues:
     per_line: int
     line_bytes: int
 
-    def pieces(self, path: Path, start: int, stop: int) -> Iterator[NDArray[np.float64]]:
-        """Yield the values from `start` to `stop`, in pieces of any length.
+    def pieces(
+        self, path: Path, stream: BinaryIO, start: int, stop: int, slab: int = SLAB_VALUES
+    ) -> Iterator[NDArray[np.float64]]:
+        """Yield the values from `start` to `stop`, in pieces of any length; see `Values`.
 
         Raises
         ------
         FormatError
             The file ends before `stop`, a line has another length, or a value is no number.
         """
-        slab_lines = SLAB_VALUES // self.per_line
-        with path.open("rb") as stream:
-            first_line, last_line = start // self.per_line, -(-stop // self.per_line)
-            for line in range(first_line, last_line, slab_lines):
-                n_lines = min(slab_lines, last_line - line)
-                values = self._lines(path, stream, line, n_lines, stop)
-                begin = max(0, start - line * self.per_line)
-                yield values[begin : stop - line * self.per_line]
+        slab_lines = max(1, slab // self.per_line)
+        first_line, last_line = start // self.per_line, -(-stop // self.per_line)
+        for line in range(first_line, last_line, slab_lines):
+            n_lines = min(slab_lines, last_line - line)
+            values = self._lines(path, stream, line, n_lines, stop)
+            begin = max(0, start - line * self.per_line)
+            yield values[begin : stop - line * self.per_line]
 
     def _lines(self, path: Path, stream: BinaryIO, line: int, n_lines: int, stop: int) -> NDArray[np.float64]:
         """Values of some whole lines; the very last one may be short."""
@@ -114,14 +139,22 @@ def parse_fixed(path: Path, fields: NDArray[np.uint8]) -> NDArray[np.float64]:
     if values is not None:
         return values
     texts = np.ascontiguousarray(fields).view(f"S{fields.shape[1]}").ravel()
+    if (fields == ord("_")).any():
+        raise FormatError(f"{path}: a value of a record is no number: an underscore stands in it")
     try:
         return texts.astype(np.float64)
     except ValueError:
         pass
     try:
-        return np.array([float(text.strip().upper().replace(b"D", b"E")) for text in texts.tolist()])
+        return np.array([_float(text) for text in texts.tolist()])
     except ValueError as error:
         raise FormatError(f"{path}: a value of a record is no number ({error})") from error
+
+
+def _float(text: bytes) -> float:
+    """Read what Fortran prints: ``D`` for ``E``, and no letter at all before an exponent of three digits."""
+    text = text.strip().upper().replace(b"D", b"E")
+    return float(re.sub(rb"(?<=\d|\.)([+-]\d{3})\Z", rb"E\1", text))
 
 
 def _parse_aligned(columns: NDArray[np.uint8]) -> NDArray[np.float64] | None:
@@ -166,7 +199,10 @@ def _line_values(line: bytes, width: int) -> list[float]:
         cells = [bare[at : at + width].strip() for at in range(0, len(bare), width)]
         if all(LOOSE_NUMBER.fullmatch(cell) for cell in cells):
             return [float(cell.upper().replace(b"D", b"E")) for cell in cells]
-    return [float(cell.upper().replace(b"D", b"E")) for cell in bare.split()]
+    cells = bare.split()
+    if not all(LOOSE_NUMBER.fullmatch(cell) for cell in cells):
+        raise ValueError("a word that is no number")
+    return [float(cell.upper().replace(b"D", b"E")) for cell in cells]
 
 
 def count_loose_values(
@@ -209,8 +245,10 @@ class LooseValues:
     checkpoints: tuple[tuple[int, int], ...]
     width: int
 
-    def pieces(self, path: Path, start: int, stop: int) -> Iterator[NDArray[np.float64]]:
-        """Yield the values from `start` to `stop`, in pieces of any length.
+    def pieces(
+        self, path: Path, stream: BinaryIO, start: int, stop: int, slab: int = SLAB_VALUES
+    ) -> Iterator[NDArray[np.float64]]:
+        """Yield the values from `start` to `stop`, in pieces of any length; see `Values`.
 
         Raises
         ------
@@ -219,15 +257,21 @@ class LooseValues:
         """
         count, offset = [point for point in self.checkpoints if point[0] <= start][-1]
         held: list[float] = []
-        with path.open("rb") as stream:
-            stream.seek(offset)
-            while count + len(held) < stop:
-                line = stream.readline(1 << 16)
-                if not line:
-                    raise FormatError(f"{path}: truncated: the file ends at value {count + len(held)} of a record")
+        stream.seek(offset)
+        while count + len(held) < stop:
+            line = stream.readline(1 << 16)
+            if not line:
+                raise FormatError(f"{path}: truncated: the file ends at value {count + len(held)} of a record")
+            offset += len(line)
+            try:
                 held += _line_values(line, self.width)
-                if len(held) >= SLAB_VALUES:
-                    yield np.array(held[max(0, start - count) : stop - count])
-                    count, held = count + len(held), []
+            except ValueError as error:
+                raise FormatError(
+                    f"{path}: {line.strip()[:40]!r} is no row of numbers: the file has changed"
+                ) from error
+            if len(held) >= slab:
+                yield np.array(held[max(0, start - count) : stop - count])
+                count, held = count + len(held), []
+                stream.seek(offset)  # others read from the same stream in between
         if held:
             yield np.array(held[max(0, start - count) : stop - count])

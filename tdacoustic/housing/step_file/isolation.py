@@ -12,13 +12,13 @@ import pickle
 import subprocess
 import sys
 import tempfile
-import threading
 import traceback
 from pathlib import Path
 from typing import Any, Final
 
 from tdacoustic.errors import TdacousticError
 from tdacoustic.housing.box import HousingError
+from tdacoustic.isolation import PYTHON, bound_memory, child_environment, end_with_the_parent
 
 __all__ = ["run_apart"]
 
@@ -53,13 +53,12 @@ def run_apart(function: str, arguments: tuple[Any, ...], what: str, most_s: floa
     with tempfile.TemporaryDirectory(prefix="tdacoustic-") as folder:
         given, found = Path(folder, "given"), Path(folder, "found")
         given.write_bytes(pickle.dumps((function, arguments, most_bytes)))
-        environment = os.environ | {"PYTHONPATH": os.pathsep.join(entry for entry in sys.path if entry)}
         with subprocess.Popen(
-            [sys.executable, "-c", _CODE, str(given), str(found)],
+            [*PYTHON, "-c", _CODE, str(given), str(found)],
             stdin=subprocess.PIPE,  # its end tells the child that its parent is gone
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
-            env=environment,
+            env=child_environment(),
         ) as child:
             try:
                 code = child.wait(most_s)
@@ -82,9 +81,9 @@ def run_apart(function: str, arguments: tuple[Any, ...], what: str, most_s: floa
 def serve() -> None:
     """Run what the parent asks for: the entry of the child process."""
     given, found = Path(sys.argv[1]), Path(sys.argv[2])
-    threading.Thread(target=_end_with_the_parent, daemon=True).start()
+    end_with_the_parent()
     function, arguments, most_bytes = pickle.loads(given.read_bytes())
-    _bound_memory(most_bytes)
+    bound_memory(most_bytes)
     result, error = None, None
     try:
         module, name = function.split(":")
@@ -101,16 +100,3 @@ def serve() -> None:
     partial.write_bytes(pickle.dumps((result, error)))
     partial.replace(found)
     os._exit(0)  # without the clean-up of libraries that may be in disorder
-
-
-def _bound_memory(most_bytes: int) -> None:
-    try:
-        import resource
-    except ImportError:  # Windows
-        return
-    resource.setrlimit(resource.RLIMIT_AS, (most_bytes, most_bytes))
-
-
-def _end_with_the_parent() -> None:
-    os.read(0, 1)
-    os._exit(1)

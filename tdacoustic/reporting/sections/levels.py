@@ -75,6 +75,8 @@ def _table(analysis: Analysis) -> Table:
     ]
     if len(bands) > 1:
         columns.append(Column("band", "Band"))
+    if (table["calibration"] == "doubtful").any():
+        columns.append(Column("calibration", "Calibrators"))
     if with_background:
         columns += [Column("background_db", "Background", "dB", 1, "number"), Column("correction", "Correction")]
     rows = [[_cell(row, column) for column in columns] for row in table.to_dict("records")]

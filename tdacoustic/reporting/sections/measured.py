@@ -58,9 +58,12 @@ def _runs(analysis: Analysis) -> Table:
 
 def _channels(analysis: Analysis) -> Table:
     bound: dict[str, Channel] = {}
-    for run in analysis.runs:
+    scalings: dict[str, dict[str, None]] = {}
+    for run in sorted(analysis.runs, key=lambda run: run.run.kind != "test"):
         for channel in run.recording.channels if run.recording is not None else ():
             bound.setdefault(channel.name, channel)
+            if run.run.kind == "test":
+                scalings.setdefault(channel.name, {})[pretty_unit(channel.scaling)] = None
     rows = []
     for stated in analysis.campaign.channels:
         used = bound.get(stated.name)
@@ -73,7 +76,8 @@ def _channels(analysis: Analysis) -> Table:
                 stated.distance_m,
                 used.sample_rate_hz if used else None,
                 pretty_unit(used.si_symbol) if used else "",
-                pretty_unit(used.scaling) if used else "not used",
+                analysis.sensors.scale_from(stated),
+                " | ".join(scalings.get(stated.name, [pretty_unit(used.scaling)])) if used else "not used",
             )
         )
     columns = (
@@ -83,6 +87,7 @@ def _channels(analysis: Analysis) -> Table:
         Column("distance_m", "Distance", "m", None, "number"),
         Column("sample_rate_hz", "Rate", "Hz", None, "number"),
         Column("unit", "SI unit"),
+        Column("scale_from", "Scale from"),
         Column("scaling", "Conversion of the log's numbers"),
     )
     return Table("channels", "Channels", columns, rows)

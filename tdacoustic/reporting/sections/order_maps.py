@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final
 
 import numpy as np
@@ -145,7 +145,7 @@ def _map(
             elements.append(_trace(at, 60.0 * speeds, limit, curve.name, curve.kind))
             middle = int(inside[inside.size // 2])
             names.append((float(at[middle]), 60.0 * float(speeds[middle]), curve.name))
-    elements += [*resonances, _names(names)]
+    elements += [*resonances, _names(names, {order.name for order in orders.orders if order.kind == "found"})]
     return Figure(*heading, axis, _speed_axis(orders, found), elements, height=500)
 
 
@@ -175,8 +175,9 @@ def _trace(x: Array, y: Array, limit: float, name: str, kind: str) -> Line:
     return Line(np.where(x <= limit, x, np.nan), y, name, "dotted", SLOTS[kind], 1.2, 0.9, group=GROUPS[kind])
 
 
-def _names(ends: Sequence[tuple[float, float, str]]) -> Markers:
+def _names(ends: Sequence[tuple[float, float, str]], found: Collection[str]) -> Markers:
     """The names of orders and curves where they leave the map."""
+    ends = sorted(ends, key=lambda end: end[2] in found)  # names that the fleet gives take the room first
     names = [name for *_, name in ends]
     x, y = np.array([x for x, *_ in ends]), np.array([y for _, y, _ in ends])
     return Markers(x, y, "orders and lines, by name", labels=names, texts=names, symbol="triangle", color=7)

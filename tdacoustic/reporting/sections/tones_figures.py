@@ -52,7 +52,7 @@ def audibility_figure(analysis: Analysis, found: Tonality, microphones: Sequence
 def criterion_figure(analysis: Analysis, found: Tonality, run: str, channel: str) -> Figure | None:
     """Return a spectrum with its tones, and from which level on a tone would be prominent; None of a run-up."""
     curve = next((c for c in found.curves if (c.run, c.channel) == (run, channel)), None)
-    spectrum = analysis.result(run, channel).spectrum
+    spectrum = None if curve is None else analysis.result(run, channel).spectrum  # of a silent channel there is neither
     if curve is None or spectrum is None:
         return None
     held = [

@@ -1,0 +1,124 @@
+"""Several logs, one run: how their times lie on one axis, and how well that is known."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tdacoustic.measured.run_clocks import LogClock, RunClocks
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Section, Table
+from tdacoustic.reporting.figure import Axis, Figure, Line, Markers
+from tdacoustic.reporting.sections.words import pretty_signs, slug
+from tdacoustic.results import Analysis
+
+__all__ = ["clocks"]
+
+_COLUMNS = (
+    Column("run", "Run"),
+    Column("log", "Log"),
+    Column("reference_log", "Reference"),
+    Column("method", "Method"),
+    Column("offset_s", "Starts at", "s", 6, "number"),
+    Column("offset_error_us", "Error", "µs", 3, "number"),
+    Column("drift_ppm", "Drift", "ppm", 3, "number"),
+    Column("drift_error_ppm", "Error", "ppm", 3, "number"),
+    Column("axis_error", "Error of an instant", "samples", 4, "number"),
+    Column("coherence", "Coherence", "", 3, "number"),
+    Column("peak_ratio", "Peak over next", "", 2, "number"),
+    Column("doubt", "Doubt"),
+)
+_METHODS = {"start": "started together", "time_stamps": "time stamps", "shared": "shared signal"}
+_METHOD = (
+    "A log's time is moved and its sampling rate corrected to the reference log's clock; its samples stay as they are. "
+    "With a shared signal, windows of one log are sought in the other, then the slope of the cross-spectrum's phase in "
+    "many short windows gives the delay along the record, and a robust line through them offset and drift. Errors are "
+    "standard errors from what the windows leave. A constant difference of the channels' delays, as of two filters or "
+    "of a way that sound takes, cannot be told from an offset. A positive drift is of a log whose clock runs fast."
+)
+
+
+def clocks(analysis: Analysis) -> Section | None:
+    """Return the section on the logs' clocks; None where no run has several logs."""
+    held = analysis.clocks
+    if not held:
+        return None
+    blocks: list[Block] = [Paragraph(pretty_signs(_sentence(run))) for run in held.values()]
+    doubts = [f"Run {run.run}: {doubt}." for run in held.values() for clock in run.clocks for doubt in clock.doubts]
+    blocks += [Notice("warning", pretty_signs(doubt)) for doubt in doubts]
+    rows = [_cells(run, clock) for run in held.values() for clock in run.clocks]
+    origin = analysis.campaign.origin
+    blocks.append(Table("clocks", "Clocks of the logs", _COLUMNS, rows, origin=origin))
+    for run in held.values():
+        blocks += [FigureBlock(_figure(run, clock), origin) for clock in run.clocks if _has_figure(clock)]
+    blocks.append(Paragraph(_METHOD))
+    return Section("clocks", "Several logs on one time axis", blocks)
+
+
+def _sentence(run: RunClocks) -> str:
+    first = run.clocks[0]
+    others = ", ".join(clock.log for clock in run.clocks)
+    if run.method == "start":
+        return (
+            f"Run {run.run}: {others} and {first.reference_log} are taken as started together; no drift is corrected."
+        )
+    if run.method == "time_stamps":
+        parts = [f"{clock.log} {clock.offset_s:.6g} s after it" for clock in run.clocks]
+        return (
+            f"Run {run.run}: by their time stamps the logs start at {first.reference_log}'s and {', '.join(parts)}; "
+            "no drift is corrected."
+        )
+    parts = [
+        f"{clock.log} starts at {clock.offset_s:.6f} s and its clock runs {abs(clock.drift_ppm or 0.0):.3g} ppm "
+        f"{'fast' if (clock.drift_ppm or 0.0) > 0.0 else 'slow'}"
+        for clock in run.clocks
+    ]
+    errors = [_axis_error(clock) for clock in run.clocks]
+    worst = max((error for error in errors if error is not None), default=0.0)
+    return (
+        f"Run {run.run}: by the shared signal and {first.reference_log}'s clock, {'; '.join(parts)}. Any instant that "
+        f"both logs hold is known within {worst:.2g} samples (standard error); nothing is resampled by that."
+    )
+
+
+def _axis_error(clock: LogClock) -> float | None:
+    if clock.estimate is None or clock.sample_rate_hz is None:
+        return None
+    return clock.estimate.axis_error_s * clock.sample_rate_hz
+
+
+def _cells(run: RunClocks, clock: LogClock) -> tuple[Cell, ...]:
+    found = clock.estimate
+    return (
+        run.run,
+        clock.log,
+        clock.reference_log,
+        _METHODS[clock.method],
+        clock.offset_s,
+        None if clock.offset_error_s is None else 1e6 * clock.offset_error_s,
+        clock.drift_ppm,
+        clock.drift_error_ppm,
+        _axis_error(clock),
+        None if found is None else found.coherence,
+        None if found is None else found.peak_ratio,
+        "; ".join(clock.doubts) or None,
+    )
+
+
+def _has_figure(clock: LogClock) -> bool:
+    return clock.estimate is not None and clock.estimate.residuals.times_s.size > 1
+
+
+def _figure(run: RunClocks, clock: LogClock) -> Figure:
+    assert clock.estimate is not None
+    left = clock.estimate.residuals
+    return Figure(
+        slug("clock", run.run, clock.log),
+        f"What offset and drift leave of the delay of {clock.log}, run {run.run}",
+        "Neighbouring windows together, with standard errors. A clock that runs evenly leaves scatter about zero.",
+        Axis("Time", "s"),
+        Axis("Delay", "µs"),
+        (
+            Line(left.times_s[[0, -1]], np.zeros(2), "even clock", style="dashed"),
+            Markers(left.times_s, 1e6 * left.delays_s, "delay", errors=1e6 * left.errors_s),
+        ),
+        height=240,
+    )

@@ -1,0 +1,159 @@
+"""Sensors: whence their sensitivities are, and what calibrators say of them."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from typing import Any
+
+from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Section, Table
+from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit
+from tdacoustic.results import Analysis
+from tdacoustic.sensors import LIMIT_DB
+from tdacoustic.sensors.checking import ChannelCalibration
+
+__all__ = ["doubtful_channels", "sensors"]
+
+RULE = (
+    f"ISO 3095 and ISO 3381 ask for a check with a calibrator before and after a series of measurements, and do not "
+    f"accept what was measured between two checks that differ by more than {LIMIT_DB:g} dB."
+)
+
+_READINGS = (
+    Column("channel", "Channel"),
+    Column("run", "Run"),
+    Column("calibrator", "Calibrator"),
+    Column("frequency_hz", "Frequency", "Hz", 1, "number"),
+    Column("read", "Read", "rms", 4, "number"),
+    Column("unit", "Unit"),
+    Column("deviation_db", "Deviation", "dB", 2, "number"),
+    Column("verdict", "Verdict", kind="verdict"),
+    Column("reason", "Finding"),
+)
+_CHANNELS = (
+    Column("channel", "Channel"),
+    Column("series", "Series", "", 0, "number"),
+    Column("action", "Scale is"),
+    Column("deviation_db", "Deviation", "dB", 2, "number"),
+    Column("drift_db", "Drift", "dB", 2, "number"),
+    Column("sigma_db", "Uncertainty", "dB", 2, "number"),
+    Column("verdict", "Verdict", kind="verdict"),
+    Column("reason", "Finding"),
+)
+_DATABASE = (
+    Column("channel", "Channel"),
+    Column("sensor", "Sensor"),
+    Column("sensitivity_stated", "Sensitivity"),
+    Column("calibrated_on", "Calibrated on"),
+    Column("due_on", "Due on"),
+    Column("scale_from", "Scale from"),
+    Column("verdict", "Verdict", kind="verdict"),
+    Column("reason", "Finding"),
+)
+
+
+def doubtful_channels(analysis: Analysis) -> tuple[str, ...]:
+    """Return the channels of whose levels calibrators say that they are doubtful."""
+    return tuple(
+        dict.fromkeys(item.channel for item in analysis.sensors.calibrations if item.verdict != "ok" and _counts(item))
+    )
+
+
+def _counts(item: ChannelCalibration) -> bool:
+    return item.action != "reported" or any(check.verdict == "bad" for check in item.checks)
+
+
+def sensors(analysis: Analysis) -> Section | None:
+    """Return the section on sensors; None of a campaign without calibrator runs and without a sensor database."""
+    found = analysis.sensors
+    if "sensors" not in analysis.tables:
+        return None
+    rows = analysis.tables["sensors"].to_dict("records")
+    blocks: list[Block] = []
+    if found.calibrations or found.problems:
+        blocks.append(Paragraph(pretty_signs(_answer(found.calibrations))))
+        doubtful = doubtful_channels(analysis)
+        if doubtful:
+            text = f"Levels of {joined(doubtful)} are doubtful; they stand marked in the table of levels. {RULE}"
+            blocks.append(Notice("warning", text))
+        else:
+            blocks.append(Paragraph(RULE))
+    if found.calibrations:
+        origin = analysis.campaign.origin
+        held = [_of_channel(item) for item in found.calibrations]
+        blocks.append(Table("sensor-scales", "What calibrators say of each channel", _CHANNELS, held, origin=origin))
+        read = [_cells(row, _READINGS) for row in rows if str(row["kind"]).startswith("calibration_")]
+        blocks.append(Table("calibrator-readings", "Readings of calibrators", _READINGS, read, origin=origin))
+        blocks.append(Paragraph(_METHOD))
+    if found.database:
+        table = analysis.campaign.sensor_table
+        name = "" if table is None else f" {table.text}"
+        held = [_cells(row, _DATABASE) for row in rows if row["kind"] == "database"]
+        blocks.append(Table("sensor-database", f"From the sensor database{name}", _DATABASE, held, origin="printed"))
+    return Section("sensors", "Sensors and calibrators", blocks)
+
+
+_METHOD = (
+    "The calibrator's tone is read where it keeps its level, at the frequency that it is found at, free of window and "
+    "of noise beside it. A scale that nobody states is set by the energy mean of the readings before and after; a "
+    'stated one is only checked, unless [analysis] calibrators = "set". The deviation is what is read by the stated '
+    "scale over what the calibrator gives, the drift what is read after over before. The standard uncertainty is that "
+    "of a class 1 sound calibrator (IEC 60942) or 3 % of a vibration calibrator [assumed], with the steadiness of the "
+    "tone and half of the drift."
+)
+
+
+def _answer(calibrations: tuple[ChannelCalibration, ...]) -> str:
+    """The findings in one or two sentences."""
+    done = {
+        action: list(dict.fromkeys(item.channel for item in calibrations if item.action == action))
+        for action in ("set", "checked")
+    }
+    parts = []
+    if done["checked"]:
+        worst = max((item for item in calibrations if item.action == "checked"), key=_off)
+        parts.append(
+            f"Calibrators check the sensitivity of {joined(done['checked'])}: the largest deviation is "
+            f"{worst.deviation_db or 0.0:+.2f} dB ({worst.channel})."
+        )
+    if done["set"]:
+        who = "They set that of" if parts else "Calibrators set the sensitivity of"
+        parts.append(f"{who} {joined(done['set'])}.")
+    drifts = [item for item in calibrations if item.drift_db is not None]
+    if drifts:
+        most = max(drifts, key=lambda item: abs(item.drift_db or 0.0))
+        limit = "more" if abs(most.drift_db or 0.0) > LIMIT_DB else "no more"
+        parts.append(
+            f"Between before and after the largest drift is {most.drift_db:+.2f} dB ({most.channel}), "
+            f"{limit} than the {LIMIT_DB:g} dB that standards allow."
+        )
+    elif parts:
+        parts.append("Drift is not known: no channel was read both before and after.")
+    return " ".join(parts) or "No calibrator run could set or check a sensitivity."
+
+
+def _off(item: ChannelCalibration) -> float:
+    return abs(item.deviation_db or 0.0)
+
+
+def _of_channel(item: ChannelCalibration) -> tuple[Cell, ...]:
+    words = {"set": "set", "checked": "checked", "reported": "as stated"}
+    return (
+        item.channel,
+        item.series,
+        words[item.action],
+        item.deviation_db,
+        item.drift_db,
+        item.sigma_db,
+        item.verdict,
+        pretty_signs(pretty_unit(item.reason)),
+    )
+
+
+def _cells(row: Mapping[Hashable, Any], columns: tuple[Column, ...]) -> tuple[Cell, ...]:
+    return tuple(_cell(row[column.key], column) for column in columns)
+
+
+def _cell(value: Any, column: Column) -> Cell:
+    if column.kind == "number":
+        return float(value)
+    return pretty_signs(pretty_unit(value)) if isinstance(value, str) else ""
