@@ -98,7 +98,9 @@ class CampaignRun(Table):
     calibrator_frequency_hz : float or None
         Default: what such calibrators usually have.
     calibrated : tuple of str
-        Channels that it was put on. Default: those of its quantity in which its tone stands out.
+        Channels that it was put on. Default: those of its quantity in which its tone stands out. Where a calibrator run
+        holds fewer logs than other runs, as those of one recorder alone, it says whose they are: the `log` of a
+        ``[[channel]]`` then counts the recorders, in the order in which the run names their logs.
     front_s, middle_s, rear_s : float or None
         Of a pass-by: when the unit's front, middle and rear are opposite the microphone, from the run's common start.
     valid : bool

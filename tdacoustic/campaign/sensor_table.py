@@ -14,10 +14,11 @@ from pydantic import ValidationError
 
 from tdacoustic.campaign.channels import CampaignChannel
 from tdacoustic.campaign.scale import physical_unit_text
+from tdacoustic.campaign.sensor_columns import SENSOR_COLUMNS, sensor_columns
 from tdacoustic.campaign.values import WrittenPath
 from tdacoustic.errors import CampaignError, MissingFileError, UnitError
 from tdacoustic.sensors import SensorEntry, entries_of
-from tdacoustic.toml_models import nearest, shown, small_file
+from tdacoustic.toml_models import shown, small_file
 from tdacoustic.units import QUANTITIES, parse_sensitivity, quantity_of_unit
 
 __all__ = ["MAX_BYTES", "MAX_ROWS", "read_sensor_table", "with_sensors"]
@@ -26,16 +27,6 @@ MAX_BYTES: Final = 4 << 20
 MAX_ROWS: Final = 20_000
 MAX_CELL: Final = 500
 
-_COLUMNS: Final = ("serial", "sensitivity", "unit", "quantity", "date", "due", "type", "note")
-_ALSO: Final = {
-    "serial_number": "serial",
-    "serial number": "serial",
-    "calibration_date": "date",
-    "calibration date": "date",
-    "due_date": "due",
-    "due date": "due",
-}
-"""Headers that laboratories write, and what they are here."""
 _NUMBER: Final = re.compile(r"\d+(\.\d+)?([eE][-+]?\d+)?")
 _DECIMAL_COMMA: Final = re.compile(r"\d+,\d+\b")
 _FORMULA: Final = re.compile(r"\s*[=+\-@].*\S")
@@ -45,8 +36,9 @@ def read_sensor_table(path: Path) -> tuple[SensorEntry, ...]:
     """Read a sensor database: one calibration of one sensor a row.
 
     UTF-8, separated by ``,`` or ``;``. Columns ``serial`` and ``sensitivity`` (as ``"10.2 mV/(m/s^2)"``; or a number,
-    with ``unit``) are needed; ``date``, ``due`` (as 2026-05-04), ``quantity``, ``type`` and ``note`` are read where
-    they stand, further ones are not.
+    with ``unit`` or the unit in brackets behind the header) are needed; ``date``, ``due`` (as 2026-05-04),
+    ``quantity``, ``type`` and ``note`` are read where they stand, further ones are not. Other spellings of the headers:
+    see `tdacoustic.campaign.sensor_columns`.
 
     Parameters
     ----------
@@ -73,13 +65,14 @@ def read_sensor_table(path: Path) -> tuple[SensorEntry, ...]:
     first = text.split("\n", 1)[0]
     reader = csv.reader(io.StringIO(text, newline=""), delimiter=";" if first.count(";") > first.count(",") else ",")
     columns: list[str] | None = None
+    unit: str | None = None
     entries: list[SensorEntry] = []
     try:
         for cells in reader:
             if not any(cell.strip() for cell in cells):
                 continue
             if columns is None:
-                columns = _header(path, cells)
+                columns, unit = sensor_columns(path, cells)
             elif len(cells) != len(columns):
                 raise CampaignError(
                     f"{path}: line {reader.line_num} has {len(cells)} cells, the header {len(columns)}"
@@ -89,6 +82,7 @@ def read_sensor_table(path: Path) -> tuple[SensorEntry, ...]:
                 raise CampaignError(f"{path}: has more than {MAX_ROWS} rows")
             else:
                 row = {column: cell.strip() for column, cell in zip(columns, cells, strict=True)}
+                row["unit"] = row.get("unit") or unit or ""
                 entries.append(_entry(f"{path}: line {reader.line_num}", row, reader.line_num))
     except csv.Error as error:
         raise CampaignError(f"{path}: line {reader.line_num}: {error}") from error
@@ -98,22 +92,8 @@ def read_sensor_table(path: Path) -> tuple[SensorEntry, ...]:
     return tuple(entries)
 
 
-def _header(path: Path, cells: Sequence[str]) -> list[str]:
-    columns = [_ALSO.get(cell.strip().lower(), cell.strip().lower()) for cell in cells]
-    for needed in ("serial", "sensitivity"):
-        if needed not in columns:
-            raise CampaignError(f"{path}: column {needed!r} is missing; there are {shown(tuple(columns))}")
-    for column in columns:
-        near = nearest(column, _COLUMNS, 0.8)
-        if near is not None and near != column and near not in columns:
-            raise CampaignError(f"{path}: column {shown(column)}: the nearest known column is {near!r}")
-        if column in _COLUMNS and columns.count(column) > 1:
-            raise CampaignError(f"{path}: column {column!r} stands twice")
-    return columns
-
-
 def _entry(place: str, row: Mapping[str, str], line: int) -> SensorEntry:
-    for column in _COLUMNS:
+    for column in SENSOR_COLUMNS:
         cell = row.get(column, "")
         if len(cell) > MAX_CELL or any(ord(character) < 0x20 for character in cell):
             raise CampaignError(f"{place}: {column} is too long or has control characters")
@@ -121,18 +101,21 @@ def _entry(place: str, row: Mapping[str, str], line: int) -> SensorEntry:
             raise CampaignError(f"{place}: {column} is a formula of a spreadsheet, {shown(cell)}; write its value")
     if not row["serial"]:
         raise CampaignError(f"{place}: serial is empty")
-    quantity = row.get("quantity") or None
+    quantity = "_".join(row.get("quantity", "").lower().split()) or None
     if quantity is not None and quantity not in QUANTITIES:
         raise CampaignError(f"{place}: quantity must be one of {', '.join(QUANTITIES)}, got {shown(quantity)}")
     sensitivity = _sensitivity(place, row)
     implied = quantity_of_unit(physical_unit_text(sensitivity))
     if quantity is not None and implied is not None and quantity != implied:
         raise CampaignError(f"{place}: sensitivity {shown(sensitivity)} does not fit quantity {quantity!r}")
+    date, due = _day(place, "date", row.get("date", "")), _day(place, "due", row.get("due", ""))
+    if date is not None and due is not None and due < date:
+        raise CampaignError(f"{place}: due on {due}, before the calibration of {date}")
     return SensorEntry(
         serial=row["serial"],
         sensitivity=sensitivity,
-        date=_day(place, "date", row.get("date", "")),
-        due=_day(place, "due", row.get("due", "")),
+        date=date,
+        due=due,
         quantity=quantity or implied,
         type=row.get("type", ""),
         note=row.get("note", ""),

@@ -365,8 +365,6 @@ def _estimate(
         )
     if last.n_used < 0.5 * last.spectra.times_s.size:
         doubts.append(f"only {last.n_used} of {last.spectra.times_s.size} windows along the overlap tell a delay")
-    if found.sign < 0.0:
-        doubts.append("one channel has the other's sign turned round")
     if edge_s > 0.0:
         doubts.append("the shared signal is digital: its edges are told to a sample, not better")
     return ClockEstimate(

@@ -103,6 +103,11 @@ class ClockEstimate:
     doubts: tuple[str, ...] = ()
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """What is of use to know and makes nothing doubtful."""
+        return ("one channel has the other's sign turned round",) if self.inverted else ()
+
+    @property
     def relation(self) -> Relation:
         """The affine map itself."""
         return Relation(self.offset_s, 1e-6 * self.drift_ppm)

@@ -1,16 +1,19 @@
-"""What every reader does alike: check what was asked for, and cut what it read into blocks."""
+"""What every reader does alike: check what was asked for, group it by where it lies, cut what it read into blocks."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 
-__all__ = ["check_request", "rebuffered", "spans", "unique_names"]
+__all__ = ["by_origin", "check_request", "in_asked_order", "rebuffered", "spans", "unique_names"]
+
+_Origin = TypeVar("_Origin", bound=Hashable)
 
 
 def check_request(path: Path, n_samples: int, start: int, stop: int, block_size: int) -> None:
@@ -39,6 +42,55 @@ def spans(start: int, stop: int, step: int) -> Iterator[tuple[int, int]]:
     """
     for first in range(start, stop, step):
         yield first, min(first + step, stop)
+
+
+def by_origin(origins: Iterable[_Origin]) -> dict[_Origin, list[int]]:
+    """Group the channels asked for by the place that each is stored in, in the order of their first mention.
+
+    Parameters
+    ----------
+    origins : iterable of hashable
+        Of each channel: the dataset, array, group or track that is read once for all of its channels.
+
+    Returns
+    -------
+    dict
+        Origin -> positions of its channels in the request.
+
+    Examples
+    --------
+    >>> by_origin(["b", "a", "b"])
+    {'b': [0, 2], 'a': [1]}
+    """
+    rows: dict[_Origin, list[int]] = {}
+    for row, origin in enumerate(origins):
+        rows.setdefault(origin, []).append(row)
+    return rows
+
+
+def in_asked_order(
+    pieces: Sequence[Iterable[NDArray[np.float64]]], rows: Iterable[Sequence[int]], block_size: int
+) -> Iterator[NDArray[np.float64]]:
+    """Join what was read from several places, its channels in the order in which they were asked for.
+
+    Parameters
+    ----------
+    pieces : sequence of iterables of ndarray, shape (channels of one place, n)
+        With any n each; all places give the same number of samples.
+    rows : iterable of sequences of int
+        Positions in the request of the channels of each place, as `by_origin` gives them or in any order.
+    block_size : int
+
+    Yields
+    ------
+    ndarray, shape (channels asked for, block_size)
+        The last one may be shorter.
+    """
+    order = np.argsort([row for members in rows for row in members])
+    as_asked = bool((order == np.arange(order.size)).all())
+    for blocks in zip(*[rebuffered(one, block_size) for one in pieces], strict=True):
+        joined = blocks[0] if len(blocks) == 1 else np.concatenate(blocks)
+        yield joined if as_asked else joined[order]
 
 
 def rebuffered(pieces: Iterable[NDArray[np.float64]], block_size: int) -> Iterator[NDArray[np.float64]]:

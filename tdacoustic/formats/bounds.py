@@ -1,21 +1,37 @@
 """What a log may claim, whatever its format: how many channels and samples, and words that are safe to show.
 
 A log comes from outside. Each reader bounds what it takes from its own headers; this is done once for all of them,
-those of other packages too, before anything else sees the log.
+those of other packages too, before anything else sees the log: what is read of it, and what is said of it in errors.
 """
 
 from __future__ import annotations
 
 import unicodedata
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import unique_names
 from tdacoustic.recording import Log, LogChannel
+from tdacoustic.recording.log import Reader
 
-__all__ = ["MAX_CHANNELS", "MAX_NAME", "MAX_UNIT", "bounded", "clean_text"]
+__all__ = [
+    "MAX_CHANNELS",
+    "MAX_MESSAGE",
+    "MAX_NAME",
+    "MAX_UNIT",
+    "ClearReader",
+    "bounded",
+    "clean_text",
+    "clear_message",
+    "clear_messages",
+]
 
 MAX_CHANNELS: Final = 10_000
 """Channels that a log may have; what is above is taken for damage [assumed]."""
@@ -26,6 +42,9 @@ MAX_FLAG: Final = 600
 MAX_FLAGS: Final = 50
 MAX_METADATA: Final = 200
 MAX_METADATA_TEXT: Final = 1000
+MAX_MESSAGE: Final = 1200
+KEPT_END: Final = 400
+"""A message that is too long loses its middle: the file is named at its begin, the reason often at its end."""
 
 MAX_SAMPLES_PER_BYTE: Final = 20_000
 """No packing that is read reaches this: deflate makes at most 1032 bytes of one, FLAC of silence some 10 000 values."""
@@ -67,6 +86,53 @@ def _shown(character: str) -> str:
     if category in ("Cc", "Cs", "Cn") or character in _INVISIBLE or 0xE0000 <= ord(character) <= 0xE007F:
         return "\ufffd"
     return character
+
+
+def clear_message(text: str) -> str:
+    r"""Return the message of an error as one line of bounded length, whatever texts of a file stand in it.
+
+    Examples
+    --------
+    >>> clear_message("a.h5: dataset 'x\x1b[2J' is\n  damaged")
+    "a.h5: dataset 'x\ufffd[2J' is damaged"
+    """
+    if len(text) > MAX_MESSAGE:
+        text = f"{text[: MAX_MESSAGE - KEPT_END - 5]} ... {text[-KEPT_END:]}"
+    return text if text.isprintable() else " ".join(clean_text(text, MAX_MESSAGE).split())
+
+
+@contextmanager
+def clear_messages() -> Iterator[None]:
+    """Make what a `FormatError` says one clear line; it stays the same error."""
+    try:
+        yield
+    except FormatError as error:
+        error.args = (clear_message(str(error)),)
+        raise
+
+
+@dataclass(frozen=True)
+class ClearReader:
+    """A reader whose errors are one clear line each.
+
+    Parameters
+    ----------
+    reader : Reader
+        Of the log's format.
+    """
+
+    reader: Reader
+
+    def blocks(self, columns: Sequence[int], start: int, stop: int, block_size: int) -> Iterator[NDArray[np.float64]]:
+        """Yield what the format's reader yields; see `tdacoustic.recording.log.Reader`.
+
+        Raises
+        ------
+        FormatError
+            As the format's reader raises it.
+        """
+        with clear_messages():
+            yield from self.reader.blocks(columns, start, stop, block_size)
 
 
 def bounded(log: Log) -> Log:

@@ -6,8 +6,10 @@ states was looked up (`ClosedFormat.known_from`); where nothing was found that s
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import takewhile
 from typing import Final
 
 __all__ = ["CLOSED_FORMATS", "UNVERIFIED", "ClosedFormat", "closed_by_content", "closed_by_suffix"]
@@ -51,15 +53,22 @@ def _begins(*magics: bytes) -> Callable[[bytes], bool]:
 
 
 def _is_head(head: bytes) -> bool:
-    return b"\x89HDF" not in head[:4] and b"HEAD acoustics" in head
+    """Whether one of the comment lines at the very beginning is the format's own."""
+    comments = takewhile(lambda line: line.startswith(b";"), head.splitlines())
+    return any(line.strip() == b"; HEAD acoustics datafile format" for line in comments)
+
+
+def _is_id3(head: bytes) -> bool:
+    """Whether the head of an ID3 tag of version 2 stands there, and not a word that begins with the same letters."""
+    return len(head) >= 10 and head[:3] == b"ID3" and head[3] in (2, 3, 4) and head[4] == 0 and max(head[6:10]) < 0x80
 
 
 def _is_tdm(head: bytes) -> bool:
-    return head.lstrip(b"\xef\xbb\xbf\r\n\t ").startswith(b"<?xml") and b"usi:tdm" in head
+    return head.lstrip(b"\xef\xbb\xbf\r\n\t ").startswith(b"<?xml") and b"<usi:tdm" in head
 
 
 def _is_tar(head: bytes) -> bool:
-    return head[257:262] == b"ustar"
+    return head[257:265] in (b"ustar\x0000", b"ustar  \x00")
 
 
 def _export(program: str, formats: str = _READ) -> str:
@@ -76,7 +85,7 @@ CLOSED_FORMATS: Final[tuple[ClosedFormat, ...]] = (
         (".hdf",),
         _export("HEAD acoustics' ArtemiS SUITE", "WAV, UFF 58, ATFX or ASCII")
         + "; in WAV the full scale is not stated: note the range of each channel for full_scale",
-        "text head 'HEAD acoustics datafile format': two public readers of SQobold recordings; WAV export: HEAD "
+        "comment line '; HEAD acoustics datafile format': public readers of SQobold recordings; WAV export: HEAD "
         "acoustics, application note Wave-Export 07/14; the other exports " + UNVERIFIED,
         _is_head,
     ),
@@ -117,7 +126,7 @@ CLOSED_FORMATS: Final[tuple[ClosedFormat, ...]] = (
         (),  # .raw and .dat are many things
         _read_elsewhere("imc FAMOS or imc STUDIO", "ATFX, UFF 58, MATLAB or WAV"),
         "first bytes '|CF,2,1,1;|CK': description in the public readers raw_eater and IMCtermite",
-        _begins(b"|CF,"),
+        lambda head: re.match(rb"\|CF,\d+,\d+,\d+;", head) is not None,
     ),
     ClosedFormat(
         "the header of a National Instruments TDM file, whose numbers lie in the .tdx beside it",
@@ -159,14 +168,15 @@ CLOSED_FORMATS: Final[tuple[ClosedFormat, ...]] = (
         "unpack it and name the logs in it",
         "first bytes: file(1)",
         lambda head: (
-            head.startswith((b"PK\x03\x04", b"PK\x05\x06", b"7z\xbc\xaf\x27\x1c", b"\x1f\x8b\x08", b"BZh"))
+            head.startswith((b"PK\x03\x04", b"PK\x05\x06", b"7z\xbc\xaf\x27\x1c", b"\x1f\x8b\x08"))
+            or re.match(rb"BZh[1-9]1AY&SY", head) is not None
             or head.startswith((b"\xfd7zXZ\x00", b"\x28\xb5\x2f\xfd", b"Rar!\x1a\x07"))
             or _is_tar(head)
         ),
         is_wrapping=True,
     ),
     ClosedFormat("a PDF", (".pdf",), "a document holds no samples: name the log itself", "first bytes %PDF-: ISO 32000",
-                 _begins(b"%PDF-")),
+                 lambda head: re.match(rb"%PDF-\d\.\d", head) is not None),
     ClosedFormat(
         "a pickle of Python, which can run programs when it is opened",
         (".pkl", ".pickle", ".joblib"),
@@ -185,8 +195,8 @@ CLOSED_FORMATS: Final[tuple[ClosedFormat, ...]] = (
         "audio packed with loss",
         (".mp3", ".m4a", ".aac", ".ogg", ".opus", ".wma"),
         "what was left out cannot be measured: record WAV or FLAC",
-        "first bytes 'OggS', 'ID3': file(1)",
-        _begins(b"OggS", b"ID3"),
+        "page head 'OggS' of version 0: RFC 3533; tag 'ID3' of versions 2.2 to 2.4: id3.org, ID3v2.4 section 3.1",
+        lambda head: head.startswith(b"OggS\x00") or _is_id3(head),
     ),
 )  # fmt: skip
 """The table. Rows that content tells stand for themselves; the others are asked by suffix, after every format."""

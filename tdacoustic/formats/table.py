@@ -9,6 +9,7 @@ A package of somebody else adds a row through the entry point group
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -18,13 +19,15 @@ from importlib.metadata import entry_points
 from pathlib import Path
 
 from tdacoustic.errors import FormatError, MissingFileError, MissingPackageError, TdacousticError
-from tdacoustic.formats.bounds import bounded
+from tdacoustic.formats.bounds import ClearReader, bounded, clear_messages
 from tdacoustic.formats.closed import closed_by_content, closed_by_suffix
+from tdacoustic.formats.starts import from_the_start
 from tdacoustic.recording import Log
 
 __all__ = ["ENTRY_POINTS", "FORMATS", "Format", "formats", "scan"]
 
 HEAD_BYTES = 4096
+NUMBER = re.compile(rb"[+-]?(?:(?:\d+[.,]?\d*|[.,]\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)", re.IGNORECASE)
 
 ENTRY_POINTS = "tdacoustic.formats"
 """Group of the entry points through which other packages add a `Format`."""
@@ -79,9 +82,10 @@ def _is_matlab(head: bytes) -> bool:
 
 
 def _is_uff(head: bytes) -> bool:
-    lines = head.splitlines()
-    lines = [line.strip() for line in lines if line.strip()][:2]
-    return len(lines) == 2 and lines[0] == b"-1" and lines[1][:6].rstrip(b"bB ").isdigit()
+    """Whether a record opens the file: not where all lines are numbers, which is one column of a text."""
+    lines = [line.strip() for line in head.splitlines() if line.strip()]
+    opens = len(lines) > 2 and lines[0] == b"-1" and lines[1][:6].rstrip(b"bB ").isdigit()
+    return opens and any(NUMBER.fullmatch(line) is None for line in lines[1:-1])
 
 
 def _is_atfx(head: bytes) -> bool:
@@ -123,7 +127,7 @@ FORMATS: tuple[Format, ...] = (
     ),
     Format("delimited", "CSV or TSV", (".csv", ".tsv", ".txt", ".asc"), _is_text, "tdacoustic.formats.delimited"),
 )
-"""The table. Content decides; text, which has no signature of its own, stands last."""
+"""The table. Content decides; text, which has no signature of its own, stands last, whatever the suffix."""
 
 
 @cache
@@ -157,14 +161,16 @@ def _format_of(path: Path, head: bytes) -> tuple[Format, tuple[str, ...]]:
     table = formats()
     named = [row for row in table if path.suffix.lower() in row.suffixes]
     by_suffix = next((row for row in named if row.matches(head)), None)
-    closed = closed_by_content(path.suffix.lower(), head)
-    if by_suffix is not None and (closed is None or by_suffix.name != "delimited"):
+    if by_suffix is not None and by_suffix.name != "delimited":
         return by_suffix, ()
     by_content = next((row for row in table if row.name != "delimited" and row.matches(head)), None)
     if by_content is not None:
         return by_content, (f"the suffix is {path.suffix or 'absent'}, the content is {by_content.title}",)
+    closed = closed_by_content(path.suffix.lower(), head)
     if closed is not None:
         raise FormatError(f"{path}: is {closed.title}; {closed.remedy}")
+    if by_suffix is not None:
+        return by_suffix, ()
     closed = closed_by_suffix(path.suffix.lower())
     if closed is not None:
         raise FormatError(f"{path}: is, by its suffix, {closed.title}; {closed.remedy}")
@@ -232,9 +238,10 @@ def scan(path: str | Path) -> Log:
         It is of no known format, or not what it claims to be.
     """
     path = Path(path)
-    head = _head_of(path)
-    row, flags = _format_of(path, head)
-    log = _scanned(row, path)
-    if not log.channels:
-        raise FormatError(f"{path}: no channel in it that could be read")
-    return bounded(replace(log, flags=(*flags, *log.flags)) if flags else log)
+    with clear_messages():
+        head = _head_of(path)
+        row, flags = _format_of(path, head)
+        log = _scanned(row, path)
+        if not log.channels:
+            raise FormatError(f"{path}: no channel in it that could be read")
+        return bounded(from_the_start(replace(log, flags=(*flags, *log.flags), reader=ClearReader(log.reader))))

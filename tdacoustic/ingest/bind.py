@@ -11,7 +11,7 @@ from tdacoustic.ingest.bound import Bound, Refusal
 from tdacoustic.ingest.conversion import convert
 from tdacoustic.ingest.cut import cut_raster
 from tdacoustic.ingest.known_scale import KnownScale
-from tdacoustic.ingest.sources import NotFoundError, find_source
+from tdacoustic.ingest.sources import NotFoundError, find_source, log_names
 from tdacoustic.recording import Channel, Log, LogChannel, Recording
 
 __all__ = ["MAX_RATE_DIFFERENCE", "bind_run"]
@@ -78,18 +78,20 @@ def bind_run(
 
 def _check_rate(run: CampaignRun, logs: Sequence[Log]) -> None:
     stated = run.sample_rate_hz
-    rates = [(log, channel.raster.sample_rate_hz) for log in logs for channel in log.channels]
+    names = log_names(run, logs)
+    rates = [(name, c.raster.sample_rate_hz) for name, log in zip(names, logs, strict=True) for c in log.channels]
     if stated is None or any(rate is None for _, rate in rates):
         return  # where one log is silent, the stated rate is that one's
-    for log, rate in rates:
+    for name, rate in rates:
         if rate is not None and abs(stated - rate) > MAX_RATE_DIFFERENCE * rate:
             raise CampaignError(
-                f"run {run.name!r}: sample_rate_hz = {stated:g}, but {log.path.name} says {rate:g}; leave it out"
+                f"run {run.name!r}: sample_rate_hz = {stated:g}, but {name} says {rate:g}; leave it out"
             )
 
 
 def _start_warnings(run: CampaignRun, logs: Sequence[Log]) -> list[str]:
-    starts = {log.path.name: log.start_time for log in logs if log.start_time is not None}
+    names = log_names(run, logs)
+    starts = {name: log.start_time for name, log in zip(names, logs, strict=True) if log.start_time is not None}
     if len(set(starts.values())) < 2:
         return []
     said = ", ".join(f"{name} at {start}" for name, start in starts.items())
@@ -114,21 +116,21 @@ def _bind_channel(
     known: KnownScale | None,
     axes: RunAxes | None,
 ) -> tuple[Channel, tuple[str, ...], str]:
-    files = ", ".join(log.path.name for log in logs)
+    names = log_names(run, logs)
     try:
-        place = find_source(channel, logs)
+        place = find_source(channel, logs, names)
     except NotFoundError as error:
-        raise _RefusedError(f"channel {channel.name!r} (run {run.name}, {files}): {error}") from None
+        raise _RefusedError(f"channel {channel.name!r} (run {run.name}, {', '.join(names)}): {error}") from None
     except CampaignError as error:
         raise CampaignError(f"run {run.name!r}: {error}") from None
-    log = logs[place.log_index]
-    source = log.channels[place.column]
+    file = names[place.log_index]
+    source = logs[place.log_index].channels[place.column]
     try:
         axis = LogAxis() if axes is None else axes.axes[place.log_index]
         found, doubts = _scaled(channel, run, source, (place.log_index, place.column), known, axis)
     except UnitError as error:
-        raise _RefusedError(f"channel {channel.name!r} (run {run.name}, {log.path.name}): {error}") from None
-    return found, (*place.warnings, *doubts), log.path.name
+        raise _RefusedError(f"channel {channel.name!r} (run {run.name}, {file}): {error}") from None
+    return found, (*place.warnings, *doubts), file
 
 
 def _scaled(

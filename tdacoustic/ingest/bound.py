@@ -36,8 +36,11 @@ class Bound:
     refused : tuple of Refusal
     warnings : tuple of str
         What is usable but doubtful; each also stands in the flags of its channel.
+    absent : tuple of str
+        Channels of the campaign that the run was not asked for, as a calibrator run of another recorder.
     """
 
     recording: Recording
     refused: tuple[Refusal, ...] = ()
     warnings: tuple[str, ...] = ()
+    absent: tuple[str, ...] = ()

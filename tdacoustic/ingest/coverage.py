@@ -36,10 +36,11 @@ def check_coverage(bounds: Sequence[Bound], channels: Sequence[CampaignChannel])
         reasons = [refusal for bound in bounds for refusal in bound.refused if refusal.channel == channel.name]
         if not reasons:
             continue
-        if len(reasons) == len(bounds):
+        asked = [bound for bound in bounds if channel.name not in bound.absent]
+        if len(reasons) == len(asked):
             faults.append(reasons[0].reason)
             continue
-        runs = f"{len(reasons)} of {len(bounds)} runs ({', '.join(refusal.run for refusal in reasons)})"
+        runs = f"{len(reasons)} of {len(asked)} runs ({', '.join(refusal.run for refusal in reasons)})"
         warnings.append(f"channel {channel.name!r} cannot be used in {runs}: {reasons[0].reason}")
     if faults:
         raise CampaignError("\n".join(faults))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import difflib
 import unicodedata
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tdacoustic.campaign import CampaignChannel
+from tdacoustic.campaign import CampaignChannel, CampaignRun
 from tdacoustic.errors import CampaignError
 from tdacoustic.recording import Log
 
-__all__ = ["Found", "NotFoundError", "find_source"]
+__all__ = ["Found", "NotFoundError", "find_source", "log_names"]
 
 
 class NotFoundError(LookupError):
@@ -46,7 +47,21 @@ def _names(log: Log) -> list[str]:
     return [channel.name for channel in log.channels]
 
 
-def find_source(channel: CampaignChannel, logs: Sequence[Log]) -> Found:
+def log_names(run: CampaignRun, logs: Sequence[Log]) -> tuple[str, ...]:
+    """Return what the logs of a run are called: the file name, or where two share it, the path as the campaign has it.
+
+    Parameters
+    ----------
+    run : CampaignRun
+    logs : sequence of Log
+        In the order of ``run.logs``.
+    """
+    files = [log.path.name for log in logs]
+    times = Counter(files)
+    return tuple(file if times[file] == 1 else written.text for file, written in zip(files, run.logs, strict=True))
+
+
+def find_source(channel: CampaignChannel, logs: Sequence[Log], names: Sequence[str] | None = None) -> Found:
     """Find a channel's source in the logs of a run.
 
     A name is looked for as it is (a leading ``/`` does not count), then without
@@ -58,6 +73,8 @@ def find_source(channel: CampaignChannel, logs: Sequence[Log]) -> Found:
     channel : CampaignChannel
     logs : sequence of Log
         In the order of the run.
+    names : sequence of str, optional
+        Of the logs, for messages. Default: their file names.
 
     Returns
     -------
@@ -73,41 +90,41 @@ def find_source(channel: CampaignChannel, logs: Sequence[Log]) -> Found:
     if channel.log is not None and channel.log > len(logs):
         raise NotFoundError(f"log = {channel.log}, but the run has {len(logs)} log{'s' if len(logs) != 1 else ''}")
     within = range(len(logs)) if channel.log is None else range(channel.log - 1, channel.log)
+    files = [log.path.name for log in logs] if names is None else names
     if isinstance(channel.source, int):
-        return _by_index(channel.source, channel, logs, within)
-    return _by_name(channel.source, channel, logs, within)
+        return _by_index(channel.source, channel, logs, files, within)
+    return _by_name(channel.source, channel, logs, files, within)
 
 
-def _by_index(source: int, channel: CampaignChannel, logs: Sequence[Log], within: range) -> Found:
+def _by_index(source: int, channel: CampaignChannel, logs: Sequence[Log], files: Sequence[str], within: range) -> Found:
     if len(within) > 1:
-        files = ", ".join(log.path.name for log in logs)
         raise CampaignError(
-            f"channel {channel.name!r}: source = {source} could be in any of {files}; "
+            f"channel {channel.name!r}: source = {source} could be in any of {', '.join(files)}; "
             f"add log = 1 ... {len(logs)} to its [[channel]]"
         )
     log = logs[within[0]]
     if source > len(log.channels):
-        raise NotFoundError(f"source = {source}, but {log.path.name} has {len(log.channels)} channels")
+        raise NotFoundError(f"source = {source}, but {files[within[0]]} has {len(log.channels)} channels")
     return Found(within[0], source - 1)
 
 
-def _by_name(source: str, channel: CampaignChannel, logs: Sequence[Log], within: range) -> Found:
+def _by_name(source: str, channel: CampaignChannel, logs: Sequence[Log], files: Sequence[str], within: range) -> Found:
     for form, loose in ((_exact, False), (_loose, True)):
         hits = [(i, c) for i in within for c, name in enumerate(_names(logs[i])) if form(name) == form(source)]
         if not hits:
             continue
         index, column = hits[0]
-        files = list(dict.fromkeys(logs[i].path.name for i, _ in hits))
         numbers = list(dict.fromkeys(i for i, _ in hits))
         if len(numbers) > 1:
             raise CampaignError(
-                f"channel {channel.name!r}: source {source!r} is in {' and in '.join(files)}; "
+                f"channel {channel.name!r}: source {source!r} is in {' and in '.join(files[i] for i in numbers)}; "
                 f"add log = {numbers[0] + 1} or log = {numbers[1] + 1} to its [[channel]]"
             )
         if len(hits) > 1:
             which = ", ".join(str(c + 1) for _, c in hits)
             raise NotFoundError(
-                f"{len(hits)} channels of {files[0]} could be source {source!r}; say which by number, source = {which}"
+                f"{len(hits)} channels of {files[index]} could be source {source!r}; say which by number, "
+                f"source = {which}"
             )
         if not loose:
             return Found(index, column)
@@ -118,5 +135,5 @@ def _by_name(source: str, channel: CampaignChannel, logs: Sequence[Log], within:
     said = f"the nearest are {', '.join(map(repr, near))}" if near else f"there are {', '.join(map(repr, names[:8]))}"
     if not near and len(names) > 8:
         said += f" and {len(names) - 8} more"
-    files = [logs[i].path.name for i in within]
-    raise NotFoundError(f"source {source!r} is not in {', '.join(files) or 'any log'}; {said}")
+    where = ", ".join(files[i] for i in within) or "any log"
+    raise NotFoundError(f"source {source!r} is not in {where}; {said}")

@@ -29,7 +29,7 @@ class CalibratorSettings:
 
 @dataclass(frozen=True)
 class CalibratorReadings:
-    """What each channel of the run shows."""
+    """What each channel of the run shows, at instants of the run's time axis."""
 
     readings: tuple[ToneReading, ...]
 
@@ -61,10 +61,10 @@ def _read(recording: Recording, name: str, stretch: Stretch) -> Plateau:
     first = round(0.5 * (stretch.start_s + stretch.end_s) * rate) - n // 2
     part = replace(channel, start_sample=channel.start_sample + first, n_samples=n)
     samples = replace(recording, channels=(part,)).samples(name)
-    span_s = (stretch.start_s, stretch.end_s)
+    span_s = (channel.start_s + stretch.start_s, channel.start_s + stretch.end_s)
     return read_plateau(
         np.ascontiguousarray(samples), rate, stretch.frequency_hz, span_s, stretch.wander_db, part.limits
     )
 
 
-CALIBRATOR = Step("calibrator", 1, read_calibrator, "Tone of a calibrator")
+CALIBRATOR = Step("calibrator", 2, read_calibrator, "Tone of a calibrator")

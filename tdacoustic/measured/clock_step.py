@@ -98,5 +98,5 @@ def find_clock(settings: ClockSettings, logs: tuple[LogFile, ...]) -> ClockFindi
     return ClockFinding(failure=found) if isinstance(found, NoRelation) else ClockFinding(found)
 
 
-CLOCK = Step("clock", 1, find_clock, "Offset and drift of a log's clock")
+CLOCK = Step("clock", 2, find_clock, "Offset and drift of a log's clock")
 """Inputs: ``logs``, the reference and the other."""

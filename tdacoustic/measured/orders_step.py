@@ -380,4 +380,4 @@ def _fixed(
         return (), (f"resonances were not looked for: {error}",)
 
 
-ORDERS = Step("orders", 2, run_orders, "Orders over the angle of the shafts")
+ORDERS = Step("orders", 3, run_orders, "Orders over the angle of the shafts")

@@ -18,7 +18,7 @@ class LogClock:
     Parameters
     ----------
     log, reference_log : str
-        File names.
+        File names, or where two logs of the run share one, their paths as the campaign has them.
     method : str
         ``"start"``, ``"time_stamps"`` or ``"shared"``.
     offset_s : float

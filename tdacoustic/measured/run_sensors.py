@@ -12,7 +12,7 @@ from tdacoustic.quality import Verdict
 from tdacoustic.sensors import ChosenEntry
 
 if TYPE_CHECKING:
-    from tdacoustic.sensors.checking import ChannelCalibration
+    from tdacoustic.sensors.channel_calibration import ChannelCalibration
 
 __all__ = ["CALIBRATION", "CampaignSensors", "DatabaseUse"]
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import AnalysisError
-from tdacoustic.orders.baseline import beside
+from tdacoustic.orders.fixed_lines import FixedLine, find_fixed_lines
 from tdacoustic.orders.order_cut import OrderCut
 from tdacoustic.orders.order_map import OrderMap
 
@@ -32,12 +32,8 @@ RAISED_DB: Final = 2.0
 FEWEST_ORDERS: Final = 2
 CHANCE: Final = 0.25
 """Chance of one order being raised where nothing is (assumed: peaks cover about a quarter of a track)."""
-LINE_RISE_DB: Final = 6.0
-"""Of a line that is fixed in Hz, over the lines beside it, in the middle of all rows."""
 SAME_WITHIN: Final = 0.02
-"""A line this near to a resonance, relative, is taken for scatter that passes through it."""
-LINE_ROWS: Final = 0.8
-"""Part of the rows in which such a line stands out, at least."""
+"""A line this near to a resonance, relative, is taken for scatter that passes through it, unless it is steady."""
 
 
 @dataclass(frozen=True)
@@ -81,7 +77,9 @@ def find_fixed_frequencies(
     share at one frequency is a resonance; what one order has alone is its own. A peak of their mean that rises 3 dB
     over the running median of an octave counts where at least two orders cross it and most of them are raised by 2 dB
     or more over what they are beside it. A line counts where it stands 6 dB above the lines beside it in four of five
-    rows, is as narrow as the window makes it, and no order that was cut explains it.
+    rows, is as narrow as the window makes it, and no order that was cut explains it. An order that meets a steady line
+    is raised by it as by a resonance: its level there counts only where it is far stronger than the line, and is taken
+    as straight elsewhere, so that of a resonance that a line stands in only the flanks may be left.
 
     Parameters
     ----------
@@ -101,28 +99,39 @@ def find_fixed_frequencies(
     chosen = [cut for cut in cuts if cut.channel == channel]
     if len(chosen) < FEWEST_ORDERS:
         raise AnalysisError(f"channel {channel}: {len(chosen)} orders are too few to tell resonances from orders")
-    found = _resonances(chosen)
-    for line in _lines(frequency_map, channel, chosen):  # scatter that a narrow resonance raises is none
-        if not any(abs(line.frequency_hz / item.frequency_hz - 1.0) < SAME_WITHIN for item in found):
-            found.append(line)
+    lines = find_fixed_lines(frequency_map, channel, chosen)
+    found = _resonances(chosen, [line for line in lines if line.steady])
+    resonances = tuple(found)
+    for line in lines:  # scatter that a narrow resonance raises is none
+        near = any(abs(line.frequency_hz / item.frequency_hz - 1.0) < SAME_WITHIN for item in resonances)
+        if line.steady or not near:
+            found.append(_line(line))
     return tuple(sorted(found, key=lambda item: item.frequency_hz))
 
 
-def _tracks(cuts: Sequence[OrderCut]) -> tuple[Array, Array]:
-    """Frequencies, and the level of each order over them in dB above its own median, NaN where it is not."""
-    pairs = []
+def _tracks(cuts: Sequence[OrderCut], lines: Sequence[FixedLine]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Frequencies; level of each order over them in dB, NaN where it is not; and where a line hides any of them.
+
+    A level that a line hides is straight between those beside it.
+    """
+    tracks = []
     for cut in cuts:
-        usable = np.isfinite(cut.mean_square) & (cut.mean_square > 0.0) & cut.stands_out
-        frequency, level = cut.order * cut.speeds_hz[usable], 10.0 * np.log10(cut.line_mean_square[usable])
-        order = np.argsort(frequency)
-        if order.size >= 5:
-            pairs.append((frequency[order], level[order]))
-    if len(pairs) < FEWEST_ORDERS:
-        return np.zeros(0), np.zeros((0, 0))
-    lowest, highest = min(pair[0][0] for pair in pairs), max(pair[0][-1] for pair in pairs)
+        place = np.argsort(cut.speeds_hz)
+        frequency = cut.order * cut.speeds_hz[place]
+        hidden = np.zeros(place.size, dtype=bool)
+        for line in lines:
+            hidden |= line.hides(cut)[place]
+        usable = (cut.stands_out & (cut.mean_square > 0.0))[place] & ~hidden
+        if usable.sum() >= 5:
+            level = 10.0 * np.log10(cut.line_mean_square[place][usable])
+            tracks.append((frequency[usable], level, frequency, hidden.astype(np.float64)))
+    if len(tracks) < FEWEST_ORDERS:
+        return np.zeros(0), np.zeros((0, 0)), np.zeros(0, dtype=bool)
+    lowest, highest = min(track[0][0] for track in tracks), max(track[0][-1] for track in tracks)
     count = max(2, round(STEPS_PER_OCTAVE * math.log2(highest / lowest)))
     axis = np.geomspace(lowest, highest, count + 1)
-    return axis, np.array([np.interp(axis, *pair, left=np.nan, right=np.nan) for pair in pairs])
+    levels = np.array([np.interp(axis, *track[:2], left=np.nan, right=np.nan) for track in tracks])
+    return axis, levels, np.any([np.interp(axis, *track[2:]) > 0.0 for track in tracks], axis=0)
 
 
 def _shared(levels: Array) -> Array:
@@ -136,10 +145,10 @@ def _shared(levels: Array) -> Array:
     return levels - offsets[:, None]
 
 
-def _resonances(cuts: Sequence[OrderCut]) -> list[FixedFrequency]:
+def _resonances(cuts: Sequence[OrderCut], lines: Sequence[FixedLine]) -> list[FixedFrequency]:
     from scipy import ndimage, signal
 
-    axis, levels = _tracks(cuts)
+    axis, levels, hidden = _tracks(cuts, lines)
     if not axis.size:
         return []
     apart = _shared(levels)
@@ -162,6 +171,8 @@ def _resonances(cuts: Sequence[OrderCut]) -> list[FixedFrequency]:
             continue
         left, right = int(details["left_ips"][index]), math.ceil(details["right_ips"][index])
         item = _resonance(axis, apart - baseline, rise, int(peak), max(left, 0), min(right, axis.size - 1))
+        if item is not None and hidden[max(left, 0) : right + 1].any():
+            item = replace(item, evidence=f"{item.evidence}; a steady line hides some of them in part")
         if item is not None:
             found.append(item)
     return found
@@ -227,50 +238,12 @@ def _fitted(axis: Array, rise: Array, peak: int, left: int, right: int) -> tuple
     return float(frequency), float(loss), ""
 
 
-def _lines(frequency_map: OrderMap, channel: int, cuts: Sequence[OrderCut]) -> list[FixedFrequency]:
-    from scipy import signal
-
-    level = 10.0 * np.log10(np.maximum(frequency_map.mean_square[channel].astype(np.float64), 1e-300))
-    usable = frequency_map.n_frames[channel] > 0
-    level, speeds = level[usable], frequency_map.speeds_hz[usable]
-    if level.shape[0] < 3:
-        return []
-    rise = level - beside(level)
-    owned = np.zeros(rise.shape, dtype=bool)
-    for order in {cut.order for cut in cuts}:
-        owned |= np.abs(frequency_map.axis - order * speeds[:, None]) < 3.0 * frequency_map.resolution
-    rise = np.where(owned, np.nan, rise)
-    with np.errstate(invalid="ignore"):
-        rows = np.isfinite(rise).sum(axis=0)
-        out = np.nansum(rise >= LINE_RISE_DB, axis=0)
-    lobe = math.ceil(frequency_map.frames.main_lobe_lines) + 1
-    free = rows >= 3
-    middle = np.zeros(rise.shape[1])
-    ordered = np.sort(rise[:, free], axis=0)  # what is no number comes last
-    middle[free] = np.take_along_axis(ordered, (rows[free] // 2)[None], axis=0)[0]
-    peaks, _ = signal.find_peaks(middle, height=LINE_RISE_DB, distance=4)
-    peaks = peaks[peaks > lobe + 1]  # below: what is slower than the frames are long, and its flank
-    sides = np.array([max(middle[max(0, peak - lobe)], middle[min(middle.size - 1, peak + lobe)]) for peak in peaks])
-    if peaks.size:  # as narrow as the window makes it
-        peaks = peaks[middle[peaks] - sides >= LINE_RISE_DB]
-    found = []
-    for peak in peaks[out[peaks] >= LINE_ROWS * rows[peaks]].tolist():
-        frequency = _between(middle, peak) * frequency_map.resolution
-        words = (
-            f"a line at {frequency:.4g} Hz stands out in {out[peak]} of {rows[peak]} classes of speed; "
-            "a line has no loss factor"
-        )
-        confidence = float(out[peak] / rows[peak])
-        found.append(
-            FixedFrequency(
-                "line", frequency, math.nan, float(middle[peak]), int(out[peak]), int(rows[peak]), confidence, words
-            )
-        )
-    return found
-
-
-def _between(middle: Array, peak: int) -> float:
-    """Place of a peak between the lines, by the parabola through three levels."""
-    left, top, right = (float(value) for value in middle[max(0, peak - 1) : peak + 2])
-    bend = left - 2.0 * top + right
-    return peak + (0.5 * (left - right) / bend if bend < 0.0 else 0.0)
+def _line(line: FixedLine) -> FixedFrequency:
+    words = (
+        f"a line at {line.frequency_hz:.4g} Hz stands out in {line.rows_out} of {line.rows} classes of speed; "
+        "a line has no loss factor"
+    )
+    confidence = line.rows_out / line.rows
+    return FixedFrequency(
+        "line", line.frequency_hz, math.nan, line.rise_db, line.rows_out, line.rows, confidence, words
+    )

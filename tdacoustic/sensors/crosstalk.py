@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
-from tdacoustic.sensors.checking import ChannelScale
+from tdacoustic.sensors.calibrator_check import ChannelScale
 from tdacoustic.sensors.reading import Plateau, ToneReading
 
 __all__ = ["CROSSTALK_DB", "own_tones"]

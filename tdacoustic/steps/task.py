@@ -14,6 +14,9 @@ from tdacoustic.steps.logfiles import LogFile
 
 __all__ = ["Step", "Task"]
 
+_READING = 2
+"""Version of the reading of logs; raised by hand whenever a format's reader gives other samples for the same file."""
+
 
 @dataclass(frozen=True)
 class Step:
@@ -84,7 +87,7 @@ def _input_key(value: object) -> Any:
     if isinstance(value, Task):
         return value.key
     if isinstance(value, LogFile):
-        return value.key
+        return f"reading/{_READING} {value.key}"
     if isinstance(value, tuple):
         return [_input_key(item) for item in value]
     raise StoreError(f"a step's input must be a task or a log, got {type(value).__name__}")

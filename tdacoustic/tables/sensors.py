@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from tdacoustic.measured.run_sensors import CampaignSensors, DatabaseUse
-from tdacoustic.sensors.checking import CalibratorCheck, ChannelCalibration
+from tdacoustic.sensors.calibrator_check import CalibratorCheck
+from tdacoustic.sensors.channel_calibration import ChannelCalibration
 from tdacoustic.tables.frames import Row, frame_of
 from tdacoustic.units import QUANTITY_SI_SYMBOL
 

@@ -176,7 +176,7 @@ def _assemble(
         held = [run for run in runs if run.run.condition == condition and run.run.kind == "test"]
         steady = {run.name: evidence[run.name] for run in held if run.name in evidence and _is_steady(run)}
         known = ConditionEvidence(condition, microphones, steady, kinematics, components, fleet is not None)
-        found, draws = attribute(known, campaign.excludes, campaign.overrides, _seed(known))
+        found, draws = attribute(known, campaign.excludes, campaign.overrides, _seed(first, known))
         sources += found
         asked.append(known)
         energy = _receiver_energy(held, microphones)
@@ -192,7 +192,7 @@ def _assemble(
     contributions, modes = campaign_contributions(first, second), campaign_modes(first, second)
     problems += missing_components(first, second) if second.made else []
     agreements = {
-        known.condition: agreement_of_condition(known, campaign.excludes, _seed(known), contributions)
+        known.condition: agreement_of_condition(known, campaign.excludes, _seed(first, known), contributions)
         for known in (asked if second.made else ())
     }
     tables = {
@@ -242,11 +242,13 @@ def _is_steady(run: MeasuredRun) -> bool:
     return run.measurement is not None and run.measurement.steady
 
 
-def _seed(known: ConditionEvidence) -> int:
-    """Seed of the resampling: derived from what is resampled."""
-    from tdacoustic.steps.codec import fingerprint
+def _seed(first: FirstPass, known: ConditionEvidence) -> int:
+    """Seed of the resampling, from the keys of the steps: where numbers differ in the last bit the seed does not."""
+    import hashlib
 
-    return int(fingerprint([known.condition, list(known.evidence.values())])[:15], 16)
+    tasks = [first.prepared[name].task for name in known.evidence]
+    keys = "\n".join([known.condition, *sorted(task.key for task in tasks if task is not None)])
+    return int(hashlib.sha256(keys.encode()).hexdigest()[:15], 16)
 
 
 def _kinematics(fleet: Fleet | None, runs: Sequence[MeasuredRun]) -> dict[str, RunKinematics]:

@@ -2,118 +2,98 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 from tdacoustic.errors import AnalysisError, CampaignError, TdacousticError
-from tdacoustic.formats import scan
 from tdacoustic.ingest.axes import LogAxis, RunAxes
-from tdacoustic.ingest.sources import NotFoundError, find_source
-from tdacoustic.ingest.stamps import Stamp, late_s, parse_stamp
-from tdacoustic.measured.clock_step import CLOCK, ClockFinding, ClockSettings, SharedChannel
+from tdacoustic.ingest.stamps import Stamp, late_s
 from tdacoustic.measured.run_clocks import LogClock, RunClocks
 from tdacoustic.quality import Verdict
-from tdacoustic.recording import Log
-from tdacoustic.steps import Store, Task, execute, lineage, log_file, result_of
+from tdacoustic.steps import Store, Task
+from tdacoustic.workflows.several_logs import SeveralLogs
+from tdacoustic.workflows.shared_clocks import clocks_by_signal, shared_tasks, sought_clocks
 
 if TYPE_CHECKING:
-    from tdacoustic.campaign import Campaign, CampaignRun
+    from tdacoustic.campaign import Campaign
     from tdacoustic.steps import Record
     from tdacoustic.steps.execution import Progress
+    from tdacoustic.workflows.scanned_runs import ScannedRun
 
-__all__ = ["campaign_clocks"]
+__all__ = ["CampaignClocks", "campaign_clocks"]
 
 SUB_SECOND_S: Final = 0.5
 """Resolution below which stamps are believed without being asked for."""
-WELL_ALIGNED: Final = 0.1
-"""Samples of error of the axis, above which a warning says it."""
 
 
 @dataclass(frozen=True)
-class _Several:
-    """A run of several logs."""
+class CampaignClocks:
+    """How the logs of a campaign's runs lie on one axis each.
 
-    run: CampaignRun
-    logs: tuple[Log, ...]
+    Parameters
+    ----------
+    runs : mapping of str to RunClocks
+        By run of several logs.
+    failed : mapping of str to TdacousticError
+        By run, why that cannot be had.
+    records : mapping of str to Record
+        By key, of the steps that were needed.
+    """
 
-    @property
-    def reference(self) -> int:
-        return (self.run.reference_log or 1) - 1
-
-    @property
-    def others(self) -> tuple[int, ...]:
-        return tuple(index for index in range(len(self.logs)) if index != self.reference)
-
-    def name(self, index: int) -> str:
-        return self.logs[index].path.name
-
-    def stamps(self) -> list[Stamp | None]:
-        return [None if log.start_time is None else parse_stamp(log.start_time) for log in self.logs]
-
-    def rate(self, index: int, column: int) -> float | None:
-        return self.logs[index].channels[column].raster.sample_rate_hz or self.run.sample_rate_hz
-
-    def span_s(self, index: int) -> tuple[float, float]:
-        """First and last instant of a log's samples after its own start."""
-        rasters = [channel.raster for channel in self.logs[index].channels]
-        rates = [self.rate(index, column) for column in range(len(rasters))]
-        ends = [r.start_s + r.n_samples / rate for r, rate in zip(rasters, rates, strict=True) if rate is not None]
-        return min((r.start_s for r in rasters), default=0.0), max(ends, default=0.0)
+    runs: Mapping[str, RunClocks] = field(default_factory=dict)
+    failed: Mapping[str, TdacousticError] = field(default_factory=dict)
+    records: Mapping[str, Record] = field(default_factory=dict)
 
 
 def campaign_clocks(
-    campaign: Campaign, store: Store, n_jobs: int | None, progress: Progress | None
-) -> tuple[dict[str, RunClocks], dict[str, TdacousticError], dict[str, Record]]:
-    """Return the clocks of each run of several logs, why some cannot be had, and the records of the steps.
+    campaign: Campaign,
+    scanned: Sequence[ScannedRun],
+    store: Store,
+    n_jobs: int | None = None,
+    progress: Progress | None = None,
+) -> CampaignClocks:
+    """Find the clocks of each run of several logs; one that cannot be had does not stop the others.
 
     Parameters
     ----------
     campaign : Campaign
+    scanned : sequence of ScannedRun
+        Its valid runs.
     store : Store
-    n_jobs : int or None
-    progress : callable or None
+    n_jobs : int, optional
+        Processes; default 1.
+    progress : callable, optional
     """
     clocks: dict[str, RunClocks] = {}
     failed: dict[str, TdacousticError] = {}
     tasks: dict[str, dict[int, Task]] = {}
-    held: dict[str, _Several] = {}
-    for run in campaign.runs:
-        if not run.valid or len(run.logs) < 2:
+    held: dict[str, SeveralLogs] = {}
+    for item in scanned:
+        run, several = item.run, SeveralLogs(item)
+        if len(item.logs) < 2:
             continue
-        try:
-            several = _Several(run, tuple(scan(log.path) for log in run.logs))
-        except TdacousticError:
-            continue  # said where the run's channels are bound
         try:
             method = _method(several)
             if method == "shared":
-                tasks[run.name], held[run.name] = _tasks(campaign, several, store), several
+                tasks[run.name], held[run.name] = shared_tasks(campaign, several, store), several
             elif method == "time_stamps":
                 clocks[run.name] = _by_stamps(several)
             else:
                 clocks[run.name] = _together(several)
         except TdacousticError as error:
             failed[run.name] = error
-    every = [task for of_run in tasks.values() for task in of_run.values()]
-    errors = execute(every, store, n_jobs or 1, progress).failed if every else {}
-    records: dict[str, Record] = {}
-    for name, of_run in tasks.items():
-        broken = next((errors[task.key] for task in of_run.values() if task.key in errors), None)
-        if broken is not None:
-            failed[name] = broken
-            continue
-        for task in of_run.values():
-            records.update(lineage(task, store))
-        found = {index: result_of(task, store) for index, task in of_run.items()}
+    found, broken, records = sought_clocks(tasks, store, n_jobs or 1, progress)
+    failed |= broken
+    for name, findings in found.items():
         try:
-            clocks[name] = _by_signal(held[name], found)
+            clocks[name] = clocks_by_signal(held[name], findings)
         except AnalysisError as error:
             failed[name] = error
-    return clocks, failed, records
+    return CampaignClocks(clocks, failed, records)
 
 
-def _method(several: _Several) -> str:
+def _method(several: SeveralLogs) -> str:
     """Return what the run says, else what its time stamps allow."""
     run = several.run
     if run.align_on:
@@ -123,6 +103,8 @@ def _method(several: _Several) -> str:
     stamps = several.stamps()
     known = [stamp for stamp in stamps if stamp is not None]
     if len(known) == len(stamps) and len({stamp.zoned for stamp in known}) == 1:
+        if several.run.is_calibration and _apart(several, known):
+            return "time_stamps"  # one recorder after the other: these did not start together
         _check_overlap(several, known)
         differ = any(late_s(stamp, known[0]) != 0.0 for stamp in known[1:])
         if differ and all(stamp.zoned and stamp.resolution_s < SUB_SECOND_S for stamp in known):
@@ -130,36 +112,50 @@ def _method(several: _Several) -> str:
     return "start"
 
 
-def _check_overlap(several: _Several, stamps: Sequence[Stamp]) -> None:
-    """Raise where time stamps put a log wholly before or after the reference."""
-    own = several.span_s(several.reference)
+def _apart(several: SeveralLogs, stamps: Sequence[Stamp]) -> tuple[int, ...]:
+    """Logs that time stamps put wholly before or after the reference."""
+    own, found = several.span_s(several.reference), []
     for index in several.others:
         late = late_s(stamps[index], stamps[several.reference])
         first, last = several.span_s(index)
         if late + first >= own[1] or late + last <= own[0]:
-            raise CampaignError(
-                f"run {several.run.name!r}: by their time stamps {several.name(several.reference)} "
-                f"({stamps[several.reference].text}, {own[1] - own[0]:.6g} s) and {several.name(index)} "
-                f"({stamps[index].text}, {last - first:.6g} s) do not overlap: the latter starts {late:.9g} s later. "
-                'If a stamp is wrong, state align = "start" (they started together) or align_on = [...] (a signal that '
-                "both hold)"
-            )
+            found.append(index)
+    return tuple(found)
 
 
-def _together(several: _Several) -> RunClocks:
+def _check_overlap(several: SeveralLogs, stamps: Sequence[Stamp]) -> None:
+    """Raise where time stamps put a log wholly before or after the reference.
+
+    A calibrator goes from microphone to microphone: the logs of its runs need not overlap.
+    """
+    apart = () if several.run.is_calibration else _apart(several, stamps)
+    if not apart:
+        return
+    one, two = several.reference, apart[0]
+    lengths = [last - first for first, last in map(several.span_s, (one, two))]
+    raise CampaignError(
+        f"run {several.run.name!r}: by their time stamps {several.name(one)} ({stamps[one].text}, {lengths[0]:.6g} s) "
+        f"and {several.name(two)} ({stamps[two].text}, {lengths[1]:.6g} s) do not overlap: the latter starts "
+        f"{late_s(stamps[two], stamps[one]):.9g} s later. "
+        'If a stamp is wrong, state align = "start" (they started together) or align_on = [...] (a signal that both '
+        "hold)"
+    )
+
+
+def _together(several: SeveralLogs) -> RunClocks:
     logs = tuple(LogClock(several.name(i), several.name(several.reference), "start") for i in several.others)
     return RunClocks(several.run.name, "start", logs)
 
 
-def _by_stamps(several: _Several) -> RunClocks:
+def _by_stamps(several: SeveralLogs) -> RunClocks:
     run, stamps = several.run, []
-    for log, stamp in zip(several.logs, several.stamps(), strict=True):
+    for name, log, stamp in zip(several.scanned.names, several.logs, several.stamps(), strict=True):
         if stamp is None:
             said = "states no start" if log.start_time is None else f"states its start as {log.start_time!r}"
-            raise CampaignError(f"run {run.name!r}: align = 'time_stamps', but {log.path.name} {said}")
+            raise CampaignError(f"run {run.name!r}: align = 'time_stamps', but {name} {said}")
         stamps.append(stamp)
     if len({stamp.zoned for stamp in stamps}) > 1:
-        texts = ", ".join(f"{log.path.name} at {stamp.text}" for log, stamp in zip(several.logs, stamps, strict=True))
+        texts = ", ".join(f"{name} at {stamp.text}" for name, stamp in zip(several.scanned.names, stamps, strict=True))
         raise CampaignError(f"run {run.name!r}: some time stamps have a zone and some none: {texts}")
     _check_overlap(several, stamps)
     reference = stamps[several.reference]
@@ -173,110 +169,7 @@ def _by_stamps(several: _Several) -> RunClocks:
             f"which resolve {resolution_s:g} s; how well the two clocks were set is not known, their drift is not "
             "corrected"
         )
-        verdicts.append(Verdict("", "clock", "warning", doubt))
+        verdicts.append(Verdict("", "clock", "warning" if several.needs_axis else "ok", doubt))
         names = several.name(index), several.name(several.reference)
-        clocks.append(LogClock(*names, "time_stamps", late, doubts=(doubt,)))
+        clocks.append(LogClock(*names, "time_stamps", late, doubts=(doubt,) if several.needs_axis else ()))
     return RunClocks(run.name, "time_stamps", tuple(clocks), RunAxes(several.reference, tuple(axes)), tuple(verdicts))
-
-
-# ---------------------------------------------------------------- shared signals
-
-
-def _tasks(campaign: Campaign, several: _Several, store: Store) -> dict[int, Task]:
-    """One task for each log but the reference."""
-    run, reference = several.run, several.reference
-    columns = [_column(campaign, several, index) for index in range(len(several.logs))]
-    stamps = several.stamps()
-    found = {}
-    for index in several.others:
-        one, two = stamps[reference], stamps[index]
-        centre_s = late_s(two, one) if one is not None and two is not None and one.zoned == two.zoned else 0.0
-        settings = ClockSettings(
-            columns[reference], columns[index], run.max_offset_s, centre_s if run.max_offset_s is not None else 0.0
-        )
-        files = [log_file(several.logs[i].path, store, several.logs[i].companions) for i in (reference, index)]
-        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=tuple(files))
-    return found
-
-
-def _column(campaign: Campaign, several: _Several, index: int) -> SharedChannel:
-    """Find the shared signal in a log."""
-    from tdacoustic.campaign import CampaignChannel
-
-    run, log = several.run, several.logs[index]
-    name = run.align_on[0] if len(run.align_on) == 1 else run.align_on[index]
-    stated = next((channel for channel in campaign.channels if channel.name == name), None)
-    if stated is not None and stated.log is not None and len(run.align_on) > 1 and stated.log != index + 1:
-        raise CampaignError(
-            f"run {run.name!r}: align_on names {name!r} for log {index + 1} ({log.path.name}), but its [[channel]] "
-            f"says log = {stated.log}; align_on is in the order of logs"
-        )
-    source = name if stated is None else stated.source
-    try:
-        place = find_source(CampaignChannel(name="shared", source=source, log=index + 1), several.logs)
-    except NotFoundError as error:
-        raise CampaignError(f"run {run.name!r}: align_on {name!r}: {error}") from None
-    raster = log.channels[place.column].raster
-    rate = several.rate(index, place.column)
-    if rate is None:
-        raise CampaignError(
-            f"run {run.name!r}: {log.path.name} states no sampling rate, add sample_rate_hz = ... to the run"
-        )
-    return SharedChannel(place.column, rate, raster.n_samples, raster.start_s)
-
-
-def _by_signal(several: _Several, found: dict[int, ClockFinding]) -> RunClocks:
-    run, names = several.run, several.name(several.reference)
-    axes, clocks, verdicts = [LogAxis()] * len(several.logs), [], []
-    for index, finding in found.items():
-        estimate = finding.estimate
-        if estimate is None:
-            failure = finding.failure
-            reason = "no alignment was found" if failure is None else failure.reason
-            hint = (
-                "max_offset_s narrows the search"
-                if failure is not None and failure.ambiguous
-                else ('align = "start" or "time_stamps" goes without it')
-            )
-            raise AnalysisError(
-                f"run {run.name!r}: {several.name(index)} is not aligned to {names} on {', '.join(run.align_on)}: "
-                f"{reason}; {hint}"
-            )
-        rate = max(_highest_rate(several, i) for i in (index, several.reference))
-        said = (
-            f"starts at {estimate.offset_s:.9g} s of {names} and counts {estimate.drift_ppm:+.4g} ppm of its rate, "
-            f"by {_of_whom(run.align_on, index)}"
-        )
-        axes[index] = LogAxis(estimate.offset_s, 1.0 + 1e-6 * estimate.drift_ppm, f"time axis {said}")
-        error = estimate.axis_error_s * rate
-        words = (
-            f"{several.name(index)} {said}; standard error {1e6 * estimate.offset_error_s:.3g} us, "
-            f"{estimate.drift_error_ppm:.2g} ppm, of an instant at most {error:.2g} samples; nothing is resampled"
-        )
-        doubtful = bool(error > WELL_ALIGNED or estimate.doubts)
-        verdicts.append(Verdict("", "clock", "warning" if doubtful else "ok", "; ".join((words, *estimate.doubts))))
-        clocks.append(
-            LogClock(
-                several.name(index),
-                names,
-                "shared",
-                estimate.offset_s,
-                estimate.offset_error_s,
-                estimate.drift_ppm,
-                estimate.drift_error_ppm,
-                rate,
-                estimate,
-                estimate.doubts,
-            )
-        )
-    return RunClocks(run.name, "shared", tuple(clocks), RunAxes(several.reference, tuple(axes)), tuple(verdicts))
-
-
-def _of_whom(align_on: Sequence[str], index: int) -> str:
-    return align_on[0] if len(align_on) == 1 else align_on[index]
-
-
-def _highest_rate(several: _Several, index: int) -> float:
-    """Highest rate of a log: what an error is measured in."""
-    rates = [several.rate(index, column) for column in range(len(several.logs[index].channels))]
-    return max(rate for rate in rates if rate is not None)

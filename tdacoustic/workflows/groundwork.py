@@ -1,6 +1,7 @@
 """What must be known of a campaign's logs before its channels can be bound to them.
 
-Each part reads samples, so each is a step: results are kept, and a campaign that asks for nothing of it pays nothing.
+Logs are scanned once. What reads samples is a step: results are kept, and a campaign that asks for nothing of it pays
+nothing. Clocks come first, as a calibrator run of several logs is read on its own time axis.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
     from tdacoustic.steps import Record, Store
     from tdacoustic.steps.execution import Progress
+    from tdacoustic.workflows.scanned_runs import ScannedRun
 
 __all__ = ["Groundwork", "lay_groundwork"]
 
@@ -35,12 +37,15 @@ class Groundwork:
         By key, of the steps that were needed.
     sensors : CampaignSensors
         Scales from a sensor database and from calibrators.
+    scanned : tuple of ScannedRun
+        All valid runs of the campaign: their logs are scanned once, here.
     """
 
     clocks: Mapping[str, RunClocks] = field(default_factory=dict)
     failed: Mapping[str, TdacousticError] = field(default_factory=dict)
     records: Mapping[str, Record] = field(default_factory=dict)
     sensors: CampaignSensors = field(default_factory=CampaignSensors)
+    scanned: tuple[ScannedRun, ...] = ()
 
 
 def lay_groundwork(
@@ -63,7 +68,9 @@ def lay_groundwork(
     """
     from tdacoustic.workflows.calibrators import campaign_sensors
     from tdacoustic.workflows.clocks import campaign_clocks
+    from tdacoustic.workflows.scanned_runs import scan_runs
 
-    sensors, records = campaign_sensors(campaign, store, n_jobs, progress)
-    clocks, failed, of_clocks = campaign_clocks(campaign, store, n_jobs, progress)
-    return Groundwork(clocks, failed, {**records, **of_clocks}, sensors)
+    scanned = scan_runs(campaign)
+    clocks = campaign_clocks(campaign, scanned, store, n_jobs, progress)
+    sensors, records = campaign_sensors(campaign, scanned, clocks, store, n_jobs, progress)
+    return Groundwork(clocks.runs, clocks.failed, {**records, **clocks.records}, sensors, scanned)

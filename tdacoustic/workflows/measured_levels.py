@@ -122,6 +122,15 @@ def _recorded(
         yield band_levels(usable, conditions, fleet.number("radiation.max_frequency_hz"))
     if "orders" in data:
         yield order_levels(usable, fleet)
+    yield [], list(usable.calibrator_doubts(_microphones(usable, data)))
+
+
+def _microphones(usable: UsableRecordings, data: Collection[str]) -> set[str]:
+    """Microphones whose levels feed the calibration."""
+    found = set() if set(data) == {"receivers"} else set(usable.near)
+    if "receivers" in data:
+        found |= {name for name, channel in usable.microphones.items() if channel.role == "receiver"}
+    return found
 
 
 def _stated(campaign: Campaign, conditions: Mapping[str, Condition]) -> tuple[list[MeasuredLevel], list[str]]:

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING
 from tdacoustic.attribution import EVIDENCE, EvidenceSettings
 from tdacoustic.campaign import Campaign, CampaignRun, WrittenPath
 from tdacoustic.errors import CampaignError, TdacousticError
-from tdacoustic.formats import scan
 from tdacoustic.ingest import Bound, bind_run, check_coverage
 from tdacoustic.measured import FrameSettings, MeasurementSettings, measurement_task
 from tdacoustic.measured.runs import MeasuredRun, receivers_of
 from tdacoustic.quality import Verdict
-from tdacoustic.recording import Channel, Recording
+from tdacoustic.recording import Channel, Log, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
 from tdacoustic.workflows.groundwork import Groundwork, lay_groundwork
@@ -23,6 +22,7 @@ from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
 
 if TYPE_CHECKING:
     from tdacoustic.fleet import Fleet
+    from tdacoustic.workflows.scanned_runs import ScannedRun
 
 __all__ = [
     "PreparedRun",
@@ -47,6 +47,9 @@ class PreparedRun:
     measurement, evidence : Task or None
         Evidence only of a test run with a microphone.
     logs : tuple of LogFile
+        None where its logs cannot be read.
+    scanned : tuple of Log
+        The same, scanned.
     error : TdacousticError or None
         Why its logs cannot be read.
     flags : tuple of str
@@ -62,6 +65,7 @@ class PreparedRun:
     measurement: Task | None = None
     evidence: Task | None = None
     logs: tuple[LogFile, ...] = ()
+    scanned: tuple[Log, ...] = ()
     error: TdacousticError | None = None
     flags: tuple[str, ...] = ()
     no_lines: str | None = None
@@ -76,7 +80,7 @@ class PreparedRun:
 def prepare_runs(
     campaign: Campaign, store: Store, without_runs: bool = False, groundwork: Groundwork | None = None
 ) -> tuple[PreparedRun, ...]:
-    """Scan and hash the logs of all valid runs, bind their channels and make their tasks.
+    """Hash the logs of all valid runs, bind their channels and make their tasks.
 
     Parameters
     ----------
@@ -94,7 +98,7 @@ def prepare_runs(
     """
     fleet = fleet_of(campaign) if campaign.analysis.speed_from != "channels" else None
     ground = groundwork or lay_groundwork(campaign, store)
-    prepared = [_prepare(campaign, run, store, fleet, ground) for run in campaign.runs if run.valid]
+    prepared = [_prepare(campaign, item, store, fleet, ground) for item in ground.scanned]
     _check_coverage(campaign, prepared, without_runs, ground.sensors.problems)
     bound = [item.bound.recording for item in prepared if item.bound is not None]
     microphones = receivers_of(bound)
@@ -119,19 +123,24 @@ def _sensors(recording: Recording) -> tuple[tuple[str, str], ...]:
 
 
 def _prepare(
-    campaign: Campaign, run: CampaignRun, store: Store, fleet: Fleet | None, ground: Groundwork
+    campaign: Campaign, item: ScannedRun, store: Store, fleet: Fleet | None, ground: Groundwork
 ) -> PreparedRun:
-    """Scan and hash a run's logs, bind its channels, make its task."""
+    """Hash a run's logs, bind its channels, make its task."""
+    run = item.run
+    if item.error is not None:
+        return PreparedRun(run, error=item.error)
+    logs: tuple[LogFile, ...] = ()
     try:
-        scanned = tuple(scan(log.path) for log in run.logs)
+        logs = tuple(log_file(log.path, store, log.companions) for log in item.logs)
         if run.name in ground.failed:
             raise ground.failed[run.name]
         clocks = ground.clocks.get(run.name)
         axes = None if clocks is None else clocks.axes
-        bound = bind_run(campaign.channels, run, scanned, ground.sensors.of_run(run.name), axes)
-        logs = tuple(log_file(log.path, store, log.companions) for log in scanned)
+        bound = bind_run(item.channels, run, item.logs, ground.sensors.of_run(run.name), axes)
+        held = {channel.name for channel in item.channels}
+        bound = replace(bound, absent=tuple(c.name for c in campaign.channels if c.name not in held))
     except TdacousticError as error:
-        return PreparedRun(run, error=error)
+        return PreparedRun(run, logs=logs, scanned=item.logs if logs else (), error=error)
     analysis = campaign.analysis
     settings = MeasurementSettings(
         channels=bound.recording.channels,
@@ -146,10 +155,12 @@ def _prepare(
     lines = line_speed_settings(campaign, run, bound.recording, fleet)
     no_lines = lines if isinstance(lines, str) else None
     task = measurement_task(f"run {run.name}", settings, frames, logs, None if isinstance(lines, str) else lines)
-    flags = [f"{log.path.name}: {flag}" for log in scanned for flag in log.flags]
+    flags = [f"{name}: {flag}" for name, log in zip(item.names, item.logs, strict=True) for flag in log.flags]
     flags += [warning for warning in bound.warnings if not warning.startswith("channel ")]
     verdicts = (*ground.sensors.verdicts.get(run.name, ()), *(clocks.verdicts if clocks is not None else ()))
-    return PreparedRun(run, bound, task, logs=logs, flags=tuple(flags), no_lines=no_lines, verdicts=verdicts)
+    return PreparedRun(
+        run, bound, task, logs=logs, scanned=item.logs, flags=tuple(flags), no_lines=no_lines, verdicts=verdicts
+    )
 
 
 def _stated_speeds(run: CampaignRun) -> tuple[tuple[str, float], ...]:
@@ -246,15 +257,15 @@ def _input(text: str, path: Path, kind: str) -> LogInput:
 
 
 def log_inputs(prepared: Sequence[PreparedRun]) -> tuple[LogInput, ...]:
-    """Return the logs that were read, each once."""
+    """Return the logs that were read, each once; a run that is left out may still have told of clocks or sensors."""
     found: dict[str, LogInput] = {}
     for item in prepared:
-        if item.bound is not None:
-            for written, log, file in zip(item.run.logs, item.bound.recording.logs, item.logs, strict=True):
-                found[written.text] = LogInput(written.text, file.sha256, file.n_bytes, log.format)
-                for companion in file.companions:
-                    text = _beside(written.text, companion.path.relative_to(log.path.parent).as_posix())
-                    found[text] = LogInput(text, companion.sha256, companion.n_bytes, log.format)
+        held = zip(item.run.logs, item.scanned, item.logs, strict=True) if item.logs else ()
+        for written, log, file in held:
+            found[written.text] = LogInput(written.text, file.sha256, file.n_bytes, log.format)
+            for companion in file.companions:
+                text = _beside(written.text, companion.path.relative_to(log.path.parent).as_posix())
+                found[text] = LogInput(text, companion.sha256, companion.n_bytes, log.format)
     return tuple(found.values())
 
 

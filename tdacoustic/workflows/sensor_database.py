@@ -14,7 +14,7 @@ from tdacoustic.units import parse_sensitivity
 
 if TYPE_CHECKING:
     from tdacoustic.recording import LogChannel
-    from tdacoustic.workflows.calibrators import Scanned
+    from tdacoustic.workflows.scanned_runs import ScannedRun
 
 __all__ = ["database_scales"]
 
@@ -23,15 +23,15 @@ SAME_DB: Final = 0.05
 
 
 def database_scales(
-    campaign: Campaign, scanned: Sequence[Scanned]
+    campaign: Campaign, scanned: Sequence[ScannedRun]
 ) -> tuple[tuple[DatabaseUse, ...], dict[str, dict[str, KnownScale]]]:
     """Return the uses of the sensor database, and the scales that come from it, by run and channel.
 
     Parameters
     ----------
     campaign : Campaign
-    scanned : sequence of Scanned
-        Its runs that can be read.
+    scanned : sequence of ScannedRun
+        Its valid runs.
     """
     uses: dict[tuple[str, int, bool], DatabaseUse] = {}
     scales: dict[str, dict[str, KnownScale]] = {}

@@ -96,6 +96,21 @@ class UsableRecordings:
                 what = f"channel {channel}" if channel else "all of it"
                 yield f"run {run}, {what}: bad ({words}); its levels do not feed the calibration"
 
+    def calibrator_doubts(self, channels: Iterable[str]) -> Iterator[str]:
+        """Yield what calibrators find doubtful about channels whose levels feed the calibration all the same."""
+        from tdacoustic.measured.run_sensors import CALIBRATION
+
+        wanted = set(channels)
+        said = {
+            (verdict.channel, verdict.detail): None
+            for run in self.runs
+            for verdict in run.verdicts
+            if verdict.check == CALIBRATION and verdict.verdict != "ok" and not self.is_bad(run.name, verdict.channel)
+        }
+        for channel, words in said:
+            if channel in wanted:
+                yield f"channel {channel}: doubtful by calibrator ({words}); its levels feed the calibration"
+
     @property
     def microphones(self) -> dict[str, Channel]:
         """Microphones for the noise (of role receiver, or of none), by name."""

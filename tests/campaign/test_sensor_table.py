@@ -45,9 +45,41 @@ def test_rows_are_calibrations(read):
 
 
 @pytest.mark.parametrize(
+    "header",
+    [
+        "Serial,Sensitivity [mV/Pa],Date,Due",
+        "SERIAL NUMBER , sensitivity [ mV/Pa ] ,Calibration Date,Calibration_Due",
+        "Serial No.,Sensitivity (mV/Pa),cal_date,cal due",
+        "S/N,Sens. [mV/Pa],Calibration-Date,Due Date (YYYY-MM-DD)",
+        "serial_nr,SENSITIVITY[mV/Pa],Calibrated on,calibration due date",
+    ],
+)
+def test_headers_as_laboratories_spell_them(read, header):
+    (row,) = read(f"{header}\n7,47.3,2024-03-01,2025-03-01\n")
+    assert (row.serial, row.sensitivity, row.quantity) == ("7", "47.3 mV/Pa", "sound_pressure")
+    assert (row.date, row.due) == (date(2024, 3, 1), date(2025, 3, 1))
+
+
+def test_a_cell_that_states_its_unit_needs_none_of_the_header(read):
+    table = "serial,Sensitivity [mV/Pa],Unit,Quantity\n1,50 mV/Pa,,Sound Pressure\n2,10,mV/g,\n3,48,,\n"
+    assert [row.sensitivity for row in read(table)] == ["50 mV/Pa", "10 mV/g", "48 mV/Pa"]
+    (row,) = read("serial,Sensitivity (mV/(m/s^2))\n1,10.2\n")
+    assert (row.sensitivity, row.quantity) == ("10.2 mV/(m/s^2)", "acceleration")
+
+
+def test_a_further_column_that_only_sounds_like_one_is_left_alone(read):
+    (row,) = read("serial,s/n,date,calibrated,sensitivity,Sensitivity (free field)\n7,8,2024-01-01,yes,50 mV/Pa,x\n")
+    assert (row.serial, row.date, row.sensitivity) == ("7", date(2024, 1, 1), "50 mV/Pa")
+
+
+@pytest.mark.parametrize(
     ("table", "match"),
     [
         ("", "no sensor in it"),
+        ("serial,Sensitivity [furlong]\n1,50\n", r"column 'Sensitivity \[furlong\]': .*furlong"),
+        ("serial,Sensitivity [dB]\n1,50\n", r"column 'Sensitivity \[dB\]'"),
+        ("serial,sensitivity,cal due,due date\n1,50 mV/Pa,,\n", "column 'due' stands twice"),
+        ("serial,sensitivity,date,due\n1,50 mV/Pa,2025-01-01,2024-01-01\n", "due on 2024-01-01, before the calibr"),
         ("serial,sensitivity\n", "no sensor in it"),
         ("serial,sensitivty\n1,50 mV/Pa\n", "column 'sensitivity' is missing; there are"),
         ("serial,sensitivity,duee\n1,50 mV/Pa,x\n", "column 'duee': the nearest known column is 'due'"),

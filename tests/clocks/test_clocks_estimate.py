@@ -36,6 +36,8 @@ def test_ten_minutes_are_aligned_to_a_tenth_of_a_sample():
     assert worst_samples(found, 0.37, 20.0, RATE) < 0.01
     assert found.axis_error_s * RATE < 0.01
     assert found.inverted
+    assert found.notes == ("one channel has the other's sign turned round",)
+    assert found.doubts == ()  # a turned sign makes nothing doubtful
 
 
 @pytest.mark.parametrize(

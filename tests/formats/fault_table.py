@@ -10,6 +10,8 @@ from typing import Literal
 
 import numpy as np
 
+NOT_HELD = -1.0
+
 
 @dataclass(frozen=True)
 class Fault:
@@ -30,6 +32,8 @@ class Fault:
         What reading has to give, where it is not refused; None where only the outcome is held.
     tolerance : float
         Largest difference of a value, NaN equal to NaN.
+    rate_hz : float or None
+        Sampling rate that every channel has to have, None where it must not be known; `NOT_HELD` where either will do.
     """
 
     name: str
@@ -38,3 +42,4 @@ class Fault:
     says: str = ""
     values: np.ndarray | None = None
     tolerance: float = 0.0
+    rate_hz: float | None = NOT_HELD

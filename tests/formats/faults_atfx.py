@@ -104,6 +104,21 @@ def linked(folder: Path) -> Path:
     return path
 
 
+def renamed(make, suffix: str):
+    """A log of a maker under another suffix."""
+    return lambda folder: (path := make(folder)).rename(path.with_suffix(suffix))
+
+
+def unsigned(folder: Path) -> Path:
+    """Counts of 16 bits, of which nothing says what they are."""
+    (folder / "run.bin").write_bytes(INTEGERS.astype("<u2").tobytes())
+    atfx = Atfx(files=[("B", "run.bin")])
+    matrix = atfx.matrix(N)
+    atfx.time(matrix, atfx.unit("s", time=True))
+    atfx.column(matrix, "mic", None, atfx.component("values", "B", "dt_ushort", N, block=2, per_block=1))
+    return atfx.write(folder / "log.atfx")
+
+
 def missing(folder: Path) -> Path:
     path = single()(folder)
     (folder / "run.bin").unlink()
@@ -211,9 +226,21 @@ FAULTS = [
     Fault("values that are NaN", inline(numbers(HOLES).replace("nan", "NaN")), "read", values=HOLES[np.newaxis]),
     Fault("values with an infinity", inline(numbers(X[:-1]) + " -INF"), "read",
           values=np.append(X[:-1], -np.inf)[np.newaxis]),
+    Fault("unsigned integers without a unit", unsigned, "flagged",
+          r"unsigned integers of 16 bits .*offset binary\) is not known, 32768 is taken",
+          INTEGERS.astype("<u2").astype(float)[np.newaxis]),
+    Fault("a time since 1970", over_axis(numbers(1700000000.25 + T)), "flagged",
+          r"its start is 2023-11-14T22:13:20\.250000\+00:00, not 2014", X[np.newaxis], rate_hz=RATE_HZ),
     Fault("complex values", inline(numbers(X), "A_COMPLEX64"), "refused", "A_COMPLEX64"),
     Fault("texts as values", inline("<s>a</s>" * N, "A_UTF8STRING"), "refused", "A_UTF8STRING"),
     Fault("no values", single(more=lambda atfx: "", files=()), "refused", "'mic'.* has no values"),
+    # what it is called
+    *(
+        Fault(f"{words} under {suffix}", renamed(make, suffix), "flagged",
+              f"the suffix is {suffix}, the content is ASAM ODS ATFX", X[np.newaxis], 1e-6, RATE_HZ)
+        for suffix in (".xml", ".txt", ".asc", ".csv")
+        for words, make in (("values in the XML", inline(numbers(X))), ("component files", single()))
+    ),
     # scaling
     Fault("raw values without a scaling", single(INTEGERS.tobytes(), component(kind="dt_short", block=2, per_block=1),
           sequence_representation="raw_linear_external"), "refused", "needs 2 as generation parameters"),

@@ -34,6 +34,22 @@ def rf64(data_size, n_bytes=None):
     return b"RF64" + b"\xff" * 4 + body
 
 
+def mp3(n_channels):
+    """MP3 of two channels in WAV, as some recorders write it; its header may say what it likes."""
+
+    def make(folder):
+        import soundfile
+
+        soundfile.write(folder / "a.mp3", np.tile(X, 8).T, 32000, format="MP3")
+        fmt = struct.pack("<HHIIHHHHIHHH", 0x55, n_channels, 32000, 4000, 1, 0, 12, 1, 2, 417, 1, 1393)
+        chunks = chunk(b"fmt ", fmt) + chunk(b"data", (folder / "a.mp3").read_bytes())
+        (folder / "a.mp3").unlink()
+        (folder / "a.wav").write_bytes(b"RIFF" + struct.pack("<I", 4 + len(chunks)) + b"WAVE" + chunks)
+        return folder / "a.wav"
+
+    return make
+
+
 def flac(spoil):
     def make(folder):
         import soundfile
@@ -100,6 +116,11 @@ FAULTS = [
     Fault("zero bytes a sample", write(patched(32, "<H", 0)), "refused", "0 bytes a sample"),
     Fault("an encoding nobody knows", write(patched(20, "<H", 0x4242)), "refused", "cannot be read|format 16962"),
     Fault("compressed, but the blocks are no such", write(ADPCM), "refused", "cannot be read|truncated|damaged|claims"),
+    Fault(
+        "MP3 of two channels in a WAV file that says three", mp3(3), "refused", "it says 3 channels, WAV format 85 .* 2"
+    ),
+    Fault("cut in ds64", write(rf64(N * 4)[:30]), "refused", "the file ends in its ds64 chunk"),
+    Fault("ds64 claims 2^63 + 1 bytes", write(rf64(2**63 + 1)), "refused", "truncated"),
     Fault(
         "bytes a sample that do not fit the bits",
         write(patched(32, "<H", 5)),

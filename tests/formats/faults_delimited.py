@@ -44,6 +44,88 @@ ONE = X[np.newaxis]
 WITH_NAN = X.copy()
 WITH_NAN[150] = np.nan
 
+
+def from_instant(begin, form="{:.6f}", name="Time [s]", head=""):
+    """A text whose time column begins at some instant, 8192 samples a second."""
+    lines = "".join(f"{form.format(begin + i / 8192)},{x:.6f}\n" for i, x in enumerate(X))
+    return text(f"{head}{name},mic [Pa]\n{lines}")
+
+
+def stated(line, rate_hz, outcome="flagged", says="may be of thousands or of decimals"):
+    """A heading that states a rate, above one column."""
+    return Fault(
+        f"the heading says {line!r}", text(f"{line}\n{NAMED}" + "".join(SINGLE)), outcome,
+        says if outcome == "flagged" else "", ONE, rate_hz=rate_hz,
+    )  # fmt: skip
+
+
+UNIX = "its start is 2023-11-14T22:13:20.250000\\+00:00"
+STARTS = [
+    Fault("times since 1970", from_instant(1700000000.25), "flagged", UNIX, ONE, rate_hz=8192.0),
+    Fault(
+        "times since 1970 in milliseconds",
+        text("t [ms],mic\n" + "".join(f"{1.70000000025e12 + i:.0f},{x:.6f}\n" for i, x in enumerate(X))),
+        "flagged",
+        UNIX,
+        ONE,
+        rate_hz=1000.0,
+    ),
+    Fault(
+        "times since 1970 and another start in the heading",
+        from_instant(1700000000.25, head="Start time: 2023-11-13 22:13:20\n"),
+        "flagged",
+        UNIX + ", not 2023-11-13T22:13:20, which it states without a time zone",
+        ONE,
+    ),
+    Fault(
+        "times since 1904",
+        from_instant(3782844800.25),
+        "flagged",
+        "may be since 1904; .* counted from the first of them, and no start is taken",
+        ONE,
+    ),
+    Fault(
+        "times that begin two years after zero",
+        from_instant(6.3e7),
+        "flagged",
+        "begin at 63000000 s, since what date is not known",
+        ONE,
+    ),
+    Fault("times that begin ten days after zero", from_instant(864000.0), "read", "", ONE),
+]
+RATES = [
+    *(stated(line, None) for line in ("Sample rate: 51,200", "Sample rate: 51.200 Hz", "fs = 1,024", "dt: 1.250")),
+    *(stated(line, None) for line in ("Sampling rate;51,200;Hz", "Sample rate: 1,024,000", "Sample rate: 51'200 Hz")),
+    *(
+        stated(line, rate_hz, "read")
+        for line, rate_hz in {
+            "Sample rate: 51200,0": 51200.0,
+            "Sample rate: 51,2 kHz": 51200.0,
+            "Sample rate: 51.200 kHz": 51200.0,
+            "Sample rate [kHz]: 51.200": 51200.0,
+            "Sample rate: 8192.000 Hz": 8192.0,
+            "Sample rate: 5.120E+04": 51200.0,
+            "dt: 0.125": 8.0,
+            "dt: 19.531250 us": 51200.0,
+            "t_s: 0.5": None,
+            "t: 0.5": None,
+            "time_s = 0.5": None,
+            "Sampling time: 60 s": None,
+        }.items()
+    ),
+]
+WORDS = [
+    Fault("a heading that names HEAD acoustics", text("; Copyright HEAD acoustics\nHEAD acoustics SQuadriga\n" + WHOLE),
+          "read", "", ONE),
+    Fault("a column called ID3", text("ID3,ID4\n" + "".join(PAIRS)), "read", "", np.array([X, -X])),
+    Fault("a column called OggS", text("OggS\n" + "".join(SINGLE)), "read", "", ONE),
+    Fault("a column called BZh", text("BZh,b\n" + "".join(PAIRS)), "read", "", np.array([X, -X])),
+    Fault("one column that begins like a universal file", text("    -1\n    58\n   151\n     3\n", "a.txt"), "read", "",
+          np.array([[-1.0, 58.0, 151.0, 3.0]])),
+    Fault("one column that begins like a universal file, with NaN", text("-1\n58\nNaN\n-.5\n3.5\n"),
+          "read", "", np.array([[-1.0, 58.0, np.nan, -0.5, 3.5]])),
+]  # fmt: skip
+
 FAULTS = [
     Fault("cut in a number", text(WHOLE[: len(WHOLE) - 4]), "flagged", "may have been cut off"),
     Fault("cut between two fields", text(WHOLE[: WHOLE.rindex(",")]), "refused", r"line 301 has 1 fields, .* 2"),
@@ -137,6 +219,14 @@ FAULTS = [
     Fault(
         "Latin-1 among UTF-8", text("Zeit [s],Öl [m/s²]\n".encode("latin-1") + "".join(ROWS).encode()), "read", "", ONE
     ),
+    Fault("a CR between quoted cells", rows(put(100, '0.01220703,"0.5"\r7\n')), "refused", "line 102: a CR between"),
+    Fault(
+        "a CR between quoted cells far behind the beginning",
+        rows(put(70_000, '0.5,"0.5"\r7\n'), PAIRS * 240, "a [Pa],b [Pa]\n"),
+        "refused",
+        "line 70002",
+    ),
+    Fault("a quoted word of 140 000 letters above", text(f'note,"{"x" * 140_000}"\n' + WHOLE), "read", "", ONE),
     Fault("lines that end in CR alone", text(WHOLE.replace("\n", "\r")), "refused", "CR alone"),
     Fault("lines that end in CR LF and LF", text(WHOLE.replace("\n", "\r\n", 100)), "read", "", ONE),
     Fault(
@@ -156,5 +246,8 @@ FAULTS = [
         "refused",
         "no row of numbers",
     ),
+    *STARTS,
+    *RATES,
+    *WORDS,
     Fault("a workbook under the name of a text", text(b"PK\x03\x04" + bytes(200)), "refused", "packed archive"),
 ]

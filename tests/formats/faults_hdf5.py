@@ -116,10 +116,152 @@ def cycles(file):
     file["b/c"] = file["/"]
 
 
-def gap_in_time(file):
+def uneven(file, beside=None, **attributes):
+    """A group over a time with a gap; others of the file are not over it."""
     t = np.arange(N) / 8192.0
     t[300:] += 0.01
-    file["time"], file["mic"] = t, X
+    file["slow/time"], file["slow/temperature"] = t, X
+    file["slow/temperature"].attrs.update(attributes)
+    if beside is not None:
+        beside(file)
+
+
+def neighbours(file):
+    """One over an even time, one of another length in the group whose time is uneven, one with a rate of its own."""
+    file["fast/time"], file["fast/mic"] = np.arange(N) / 8192.0, X
+    file["slow/short"] = X[:90]
+    file["slow/short"].attrs["fs"] = 8192.0
+    one(file)
+
+
+def from_instant(begin, **attributes):
+    """A time vector that begins at some instant."""
+
+    def write(file):
+        file["time"], file["mic"] = begin + np.arange(N) / 8192.0, X
+        file.attrs.update(attributes)
+
+    return written(write)
+
+
+def counts(dtype, scale=None, **attributes):
+    """Integers, or floats, of which some stand for a missing value: the first, and the 100th to the 104th."""
+
+    def write(file):
+        stored = np.round(100.0 * X).astype(dtype)
+        stored[[0, *range(100, 105)]] = attributes["missing_value" if "missing_value" in attributes else "_FillValue"]
+        dataset = file.create_dataset("mic", data=stored)
+        for name, value in attributes.items():
+            dataset.attrs.create(name, value, dtype=None if name == "unit" else dtype)
+        if scale is not None:
+            dataset.attrs.update(scale_factor=scale, add_offset=-1.0)
+
+    return written(write)
+
+
+def with_units(units):
+    def write(file):
+        dataset = file.create_dataset("x", data=np.array([X, -X]).T)
+        dataset.attrs.update(fs=8192.0, units=units)
+
+    return written(write)
+
+
+ONE = X[np.newaxis]
+COUNTS = np.round(100.0 * X)
+COUNTS[[0, *range(100, 105)]] = np.nan
+UNIX = "its start is 2023-11-14T22:13:20.250000\\+00:00"
+DOUBT = "may be of thousands or of decimals: no sampling rate is taken from it"
+PULSES = X > 0.0
+
+TIMES = [
+    Fault("a time vector with a gap alone", written(uneven), "refused",
+          "not evenly sampled and are not resampled \\('slow/time' is called a time .*: slow/temperature"),
+    Fault("a time vector with a gap, beside others", written(lambda file: uneven(file, neighbours)), "flagged",
+          "1 skipped, they are not evenly sampled and are not resampled \\('slow/time' .*: slow/temperature",
+          [X, X, X[:90]], rate_hz=8192.0),
+    Fault("a time vector with a gap, beside a stated rate", written(lambda file: uneven(file, neighbours, fs=8192.0)),
+          "flagged", "not evenly sampled", [X, X, X[:90]], rate_hz=8192.0),
+    Fault("an even and an uneven time of one length",
+          written(lambda file: (uneven(file, neighbours), file.update({"slow/t": np.arange(N) / 8192.0}))), "flagged",
+          "not evenly sampled", [X, X, X[:90]], rate_hz=8192.0),
+    Fault("a temperature called T that rises unevenly",
+          written(lambda file: file.update({"T": np.sqrt(np.arange(N)), "mic": X})), "read", "",
+          [np.sqrt(np.arange(N)), X], rate_hz=None),
+    Fault("temperatures called temps",
+          written(lambda file: file.update({"temps": np.arange(N) + 50.0 * X, "mic": X})), "flagged", "does not rise",
+          [X, np.arange(N) + 50.0 * X], rate_hz=None),
+    Fault("a time vector that is nowhere a number",
+          written(lambda file: file.update({"time": np.full(N, np.nan), "mic": X})), "flagged", "is not finite",
+          rate_hz=None),
+    Fault("a time vector since 1970", from_instant(1700000000.25), "flagged", UNIX, X[np.newaxis], rate_hz=8192.0),
+    Fault("a time vector since 1970, and the start of another day",
+          from_instant(1700000000.25, start_time="2023-11-12T22:13:20+00:00"), "flagged",
+          UNIX + ", not 2023-11-12T22:13:20", X[np.newaxis]),
+    Fault("a time vector since 1970 and a channel without a date",
+          written(lambda file: (file.update({"g/t": 1.7e9 + np.arange(N) / 8192.0, "g/mic": X}), one(file))), "flagged",
+          "its times say no date and those of others do", np.array([X, X])),
+    Fault("a time vector since 1904", from_instant(3782844800.25), "flagged", "may be since 1904", X[np.newaxis],
+          rate_hz=8192.0),
+]  # fmt: skip
+RATES = [
+    *(
+        Fault(f"a rate of {text!r}", with_attributes(sample_rate_hz=text), "flagged", DOUBT, ONE, rate_hz=None)
+        for text in ("51,200", "51.200", "51,200 Hz", "1,024,000")
+    ),
+    *(
+        Fault(f"a rate of {text!r}", with_attributes(sample_rate_hz=text), "read", "", X[np.newaxis], rate_hz=rate_hz)
+        for text, rate_hz in {"51200,0": 51200.0, "8192.000": 8192.0, "8192.5 Hz": 8192.5}.items()
+    ),
+    Fault("an interval of '1.250'",
+          written(lambda file: file.create_dataset("x", data=X).attrs.update(dt="1.250")), "flagged", DOUBT, ONE,
+          rate_hz=None),
+    Fault("a rate in doubt, and the same as a number above it",
+          written(lambda file: (one(file).attrs.update(sample_rate_hz="51,200"), file.attrs.update(fs=51200.0))),
+          "read", "", ONE, rate_hz=51200.0),
+    *(
+        Fault(f"an attribute {name} that is a time",
+              written(lambda file, name=name: (file.attrs.update({name: 0.5}),
+                                               file.create_dataset("x", data=X).attrs.update({name: 0.5}))),
+              "read", "", X[np.newaxis], rate_hz=None)
+        for name in ("t_s", "t", "time_s", "T_s", "time")
+    ),
+]  # fmt: skip
+VALUES = [
+    Fault("true and false", written(lambda file: file.create_dataset("tacho", data=PULSES)), "flagged",
+          "logical values: 0 and 1", PULSES[np.newaxis].astype(float)),
+    Fault("true and false in two columns, packed",
+          written(lambda file: file.create_dataset("d", data=np.array([PULSES, ~PULSES]).T, compression="gzip")),
+          "flagged", "logical values", np.array([PULSES, ~PULSES]).astype(float)),
+    Fault("integers with a _FillValue", counts("<i2", 0.01, _FillValue=-32768, unit="Pa"), "flagged",
+          r"6 of 600 samples are missing \(_FillValue = -32768\) and read as NaN", 0.01 * COUNTS[np.newaxis] - 1.0,
+          1e-12),
+    Fault("integers of another machine with a missing_value", counts(">i4", missing_value=-9999, unit="Pa"), "flagged",
+          r"6 of 600 samples are missing \(missing_value = -9999\)", COUNTS[np.newaxis]),
+    Fault("floats with a _FillValue", counts("<f4", _FillValue=9.96921e36, unit="Pa"), "flagged",
+          r"6 of 600 samples are missing \(_FillValue = 9.96921", COUNTS[np.newaxis]),
+    Fault("several missing values",
+          written(lambda file: file.create_dataset("x", data=np.array([1.0, -99.0, 2.0, -98.0]))
+                  .attrs.update(missing_value=[-98.0, -99.0])), "flagged", "2 of 4 samples",
+          np.array([[1.0, np.nan, 2.0, np.nan]])),
+    Fault("a missing value in one of two columns",
+          written(lambda file: file.create_dataset("x", data=np.array([[1.0, 2.0], [3.0, -9.0], [5.0, 6.0]]))
+                  .attrs.update(_FillValue=-9.0)), "flagged", "1 of 3 samples",
+          np.array([[1.0, 3.0, 5.0], [2.0, np.nan, 6.0]])),
+    Fault("a _FillValue that no sample has", with_attributes(_FillValue=-9999.0), "read", "", X[np.newaxis]),
+    Fault("a _FillValue that the type cannot hold",
+          written(lambda file: file.create_dataset("x", data=np.arange(-5, 5, dtype="i1"))
+                  .attrs.update(_FillValue=-9999, unit="Pa")), "read", "", np.arange(-5.0, 5.0)[np.newaxis]),
+    Fault("a _FillValue in words", with_attributes(_FillValue="none"), "read", "", X[np.newaxis]),
+    Fault("a unit that is an array of one", with_attributes(unit=np.array([b"g"])), "read", "", X[np.newaxis]),
+    Fault("a unit for each column", with_units(np.array([b"g", b"Pa"])), "flagged",
+          "'units' holds several values: the unit is not known", np.array([X, -X])),
+    Fault("unsigned integers without a unit",
+          written(lambda file: file.create_dataset("x", data=np.arange(10, dtype="u2"))), "flagged",
+          r"unsigned integers of 16 bits .*offset binary\) is not known, 32768 is taken", np.arange(10.0)[np.newaxis]),
+    Fault("unsigned integers with a unit", written(lambda file: file.create_dataset("x", data=np.arange(10, dtype="u2"))
+          .attrs.update(unit="Pa")), "read", "", np.arange(10.0)[np.newaxis]),
+]  # fmt: skip
 
 
 NAN = np.array([1.0, np.nan, np.inf, -np.inf, *range(50)])
@@ -217,6 +359,15 @@ FAULTS = [
         "",
         X[np.newaxis],
     ),
+    Fault(
+        "an attribute whose name is not UTF-8",
+        written(
+            lambda file: one(file).attrs.update({"Gehäuse": 1.0}), lambda blob: blob.replace("ä".encode(), b"\xe4_")
+        ),
+        "read",
+        "",
+        X[np.newaxis],
+    ),
     Fault("a rate in words", with_attributes(sample_rate_hz="fast"), "read", "", X[np.newaxis]),
     Fault(
         "a unit of a thousand characters",
@@ -242,12 +393,15 @@ FAULTS = [
         "is shown as",
         X[np.newaxis],
     ),
-    Fault("a time vector with a gap", written(gap_in_time), "flagged", "not equidistant"),
+    *TIMES,
+    *RATES,
+    *VALUES,
     Fault(
         "a time vector that falls",
         written(lambda file: file.update({"time": -np.arange(N) / 8192.0, "mic": X})),
-        "read",
-        "",
+        "flagged",
+        "'time' is called a time but does not rise",
+        rate_hz=None,
     ),
     Fault(
         "an attribute and a time vector that disagree",
@@ -271,6 +425,12 @@ FAULTS = [
         X[np.newaxis],
     ),
     Fault("nothing but text", written(lambda file: file.update({"text": "hello"})), "refused", "no numeric dataset"),
+    Fault(
+        "nothing but texts, whose long names break lines and steer terminals",
+        written(lambda file: [file.create_dataset(f"{n}\n\x1b[2J\u202e{'n' * 9000}", data="a") for n in range(9)]),
+        "refused",
+        r"no numeric dataset .*n \.\.\. n.*, \.\.\.\)$",
+    ),
     Fault(
         "a square matrix",
         written(lambda file: file.create_dataset("m", data=np.eye(4))),

@@ -24,6 +24,8 @@ from makers_matlab import (
 X = np.sin(np.arange(300) / 7.0) + 0.1
 Y = np.cos(np.arange(300) / 5.0)
 RATE = numbers("fs", [[1000.0]])
+TIME = np.arange(300)[:, None] / 64.0
+UNIX = 1700000000.25 + TIME
 LONG = np.arange(200_000) % 977 / 7.0
 
 
@@ -267,12 +269,78 @@ FAULTS = [
         "flagged",
         "first column rises evenly: if it is a time in seconds, the sampling rate is 500 Hz",
     ),
+    *(
+        Fault(
+            f"{kind}time since 1970",
+            make,
+            "flagged",
+            r"its start is 2023-11-14T22:13:20\.250000\+00:00$",
+            one(X),
+            rate_hz=64.0,
+        )
+        for kind, make in {
+            "": with_rate(numbers("t", UNIX)),
+            "packed ": written(packed(numbers("x", X[:, None])), packed(numbers("time", UNIX))),
+            "7.3: ": hdf5(lambda file: (matlab_dataset(file, "x", X[:, None]), matlab_dataset(file, "t", UNIX))),
+        }.items()
+    ),
     Fault(
-        "time begins at a date",
-        with_rate(numbers("t", 1.7e9 + np.arange(300)[:, None] / 64.0)),
+        "time since 1904",
+        with_rate(numbers("t", UNIX + 2082844800.0)),
         "flagged",
-        "begins at 1.7e\\+09 s",
+        "may be since 1904; .* counted from the first of them, and no start is taken",
         one(X),
+        rate_hz=64.0,
+    ),
+    Fault(
+        "time that begins ten days after zero",
+        with_rate(numbers("t", 864000.0 + TIME)),
+        "read",
+        "",
+        one(X),
+        rate_hz=64.0,
+    ),
+    *(
+        Fault(
+            f"rate in words, {words!r}",
+            with_rate(text("fs", words)),
+            "flagged",
+            "'fs': the mark in .* may be of thousands or of decimals: no sampling rate is taken from it",
+            one(X),
+            rate_hz=None,
+        )
+        for words in ("51,200", "51.200", "51,200 Hz", "51,200 51,200", "1,024,000")
+    ),
+    *(
+        Fault(f"rate in words, {words!r}", with_rate(text("fs", words)), "read", "", one(X), rate_hz=rate_hz)
+        for words, rate_hz in {"51200,0": 51200.0, "51,2000": 51.2, "8192.000 Hz": 8192.0}.items()
+    ),
+    Fault(
+        "interval in words",
+        with_rate(text("dt", "1.250")),
+        "flagged",
+        "'dt': the mark in '1.250'",
+        one(X),
+        rate_hz=None,
+    ),
+    *(
+        Fault(f"{name}, a time", with_rate(numbers(name, [[0.5]])), "read", "", one(X), rate_hz=None)
+        for name in ("t_s", "t", "time_s", "ts", "TS", "T_s", "time")
+    ),
+    Fault("Ts, MATLAB's sample time", with_rate(numbers("Ts", [[0.5]])), "read", "", one(X), rate_hz=2.0),
+    Fault(
+        "unsigned integers",
+        with_rate(numbers("y", [[1, 2, 3]], "u2")),
+        "flagged",
+        r"unsigned integers of 16 bits .*offset binary\) is not known, 32768 is taken",
+        [X, [1.0, 2.0, 3.0]],
+    ),
+    Fault(
+        "7.3: true and false of another program",
+        hdf5(lambda file: file.create_dataset("x", data=np.array([[True], [False], [True]]))),
+        "flagged",
+        "logical values: 0 and 1",
+        one([1, 0, 1]),
     ),
     Fault(
         "two variables of one name",
@@ -356,6 +424,13 @@ FAULTS = [
     ),
     Fault("PULSE: whole", written(*of_pulse()), "read", values=np.array([X.astype("f4"), Y])),
     Fault("PULSE: decimal comma, twice", written(*of_pulse("1000,5 1000,5")), "read"),
+    Fault(
+        "PULSE: a mark of thousands",
+        written(*of_pulse("51,200 51,200")),
+        "flagged",
+        "'File_Header.SampleFrequency': the mark in '51,200' may be of thousands",
+        rate_hz=None,
+    ),
     Fault("PULSE: rate in words", written(*of_pulse("fast")), "flagged", "SampleFrequency' is not there, or no number"),
     Fault(
         "PULSE: more samples claimed", written(*of_pulse(n="400")), "flagged", "says 400, 'Channel_1_Data' holds 300"

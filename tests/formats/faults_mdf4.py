@@ -37,6 +37,14 @@ def sound(**given):
     return lambda folder: put(folder, one_group(times, given.pop("x", X[: len(times)]), **given).made(**made))
 
 
+def of_counts():
+    """A group of unsigned counts of which nothing says what they are."""
+    raw = np.zeros((N, 10), np.uint8)
+    raw[:, :8] = np.frombuffer(rows(T), np.uint8).reshape(N, 8)
+    raw[:, 8:] = np.arange(N, dtype="<u2").view(np.uint8).reshape(N, 2)
+    return one_group(T, None, (TIME, ("n", 8, {"data_type": 0, "bits": 16})), raw=raw.tobytes(), size=10)
+
+
 def patched(tag, offset, value, width=8, **given):
     """A maker whose bytes at an offset in a block are set to a number."""
 
@@ -286,6 +294,19 @@ FAULTS = [
         "not finished: lists open", sound(made={"magic": b"UnFinMF ", "unfinished": 16}), "refused", "last list of data"
     ),
     Fault("not finished: own points", sound(made={"magic": b"UnFinMF ", "own": 4}), "refused", "own flags 0x4"),
+    Fault(
+        "long names that break lines and steer terminals, none of them read",
+        sound(channels=(("t", 0, {"kind": 2, "sync": 2, "unit": "rad"}), ("n\r\n\x1b]0;\x07" * 3000, 8, {}))),
+        "refused",
+        r"no channel in it that can be read: 1 left out, they were sampled over .* \.\.\. ",
+    ),
+    Fault(
+        "unsigned integers without a unit",
+        lambda folder: put(folder, of_counts().made()),
+        "flagged",
+        r"unsigned integers of 16 bits .*offset binary\) is not known, 32768 is taken",
+        np.arange(float(N))[None],
+    ),
     Fault("MDF 3", sound(made={"version": b"3.30", "number": 330}), "refused", r"save it as MDF 4"),
     Fault("MDF 5", sound(made={"version": b"5.00", "number": 500}), "refused", "unknown version"),
     Fault("a start of a clock never set", sound(start_ns=315_532_800 * 10**9), "flagged", "1980-01-01", WRITTEN),

@@ -351,18 +351,72 @@ TRAPS = [
         "its scaling was changed while the file was written",
         3.0 * np.concatenate([X[:1], X[:1]], axis=1),
     ),
+    *(
+        Fault(
+            f"an increment that is the text {text!r}",
+            timed({"wf_increment": text}),
+            "flagged",
+            f"wf_increment is {text}: the sampling rate is not known",
+            X[:1],
+            rate_hz=None,
+        )
+        for text in ("0,000", "1,250", "51.200")
+    ),
     Fault(
-        "text, instants, true or false and complex numbers beside a channel",
+        "true or false beside a channel, one a byte of all ones",
+        log(
+            segment(
+                [("/'log'/'motor'", plain("f8", 40), wave()), ("/'log'/'tacho'", plain("bool", 40), wave("V"))],
+                f8(X[0]) + bytes(255 if high else 0 for high in X[1] > 0),
+            )
+        ),
+        "flagged",
+        "logical values: 0 and 1",
+        np.array([X[0], X[1] > 0]),
+        rate_hz=8192.0,
+    ),
+    Fault(
+        "true or false between numbers of another machine",
+        log(
+            segment(
+                [
+                    ("/'log'/'motor'", plain("i2", 40, order=">"), wave("g")),
+                    ("/'log'/'tacho'", plain("bool", 40, order=">"), wave("")),
+                ],
+                b"".join(int(x).to_bytes(2, "big", signed=True) + bytes([int(y > 0)]) for x, y in X.T),
+                order=">",
+                interleaved=True,
+            )
+        ),
+        "flagged",
+        "logical values: 0 and 1",
+        np.array([X[0], X[1] > 0]),
+    ),
+    Fault(
+        "unsigned integers without a unit",
+        log(single(plain("u2", 40), np.arange(40, dtype="<u2").tobytes(), wave(""))),
+        "flagged",
+        r"unsigned integers of 16 bits .*offset binary\) is not known, 32768 is taken",
+        np.arange(40.0)[None],
+    ),
+    Fault(
+        "unsigned integers with a unit",
+        log(single(plain("u2", 40), np.arange(40, dtype="<u2").tobytes())),
+        "read",
+        "",
+        np.arange(40.0)[None],
+    ),
+    Fault(
+        "text, instants and complex numbers beside a channel",
         log(
             segment(
                 [
                     ("/'log'/'motor'", plain("f8", 40), wave()),
                     ("/'log'/'note'", plain("text", 2, 12), {}),
                     ("/'log'/'when'", plain("time", 2), {}),
-                    ("/'log'/'on'", plain("bool", 3), {}),
                     ("/'log'/'z'", plain("c8", 1), {}),
                 ],
-                f8(X[0]) + struct.pack("<II", 2, 4) + b"abcd" + bytes(32) + bytes(3) + bytes(8),
+                f8(X[0]) + struct.pack("<II", 2, 4) + b"abcd" + bytes(32) + bytes(8),
             )
         ),
         "flagged",

@@ -24,10 +24,10 @@ def units(code: int, length: float, force: float) -> bytes:
     return (text + factors + "\n" + f"{0.0:25.17e}\n    -1\n").encode()
 
 
-def of(blob: bytes):
+def of(blob: bytes, name: str = "log.uff"):
     def write(folder: Path) -> Path:
-        (folder / "log.uff").write_bytes(blob)
-        return folder / "log.uff"
+        (folder / name).write_bytes(blob)
+        return folder / name
 
     return write
 
@@ -164,6 +164,25 @@ FAULTS = [
           values=PRINTED[np.newaxis]),
     Fault("58: a line is missing", of(b"\n".join(line for i, line in enumerate(ASCII.split(b"\n")) if i != 20)),
           "refused", "holds 294"),
+    # what it is called, and what it speaks of
+    *(
+        Fault(f"{words} under {suffix}", of(blob, f"log{suffix}"), "flagged",
+              f"the suffix is {suffix}, the content is UFF 58", values, rate_hz=8192.0)
+        for suffix in (".txt", ".asc", ".csv", ".TXT", ".dat")
+        for words, blob, values in (
+            ("58", ASCII, PRINTED[np.newaxis]),
+            ("58 with CR LF", uff_ascii(X, end=b"\r\n"), PRINTED[np.newaxis]),
+            ("58 behind other data sets", MODEL + units(1, 1, 1) + NODES + ASCII, PRINTED[np.newaxis]),
+            ("58b", BINARY, F4[np.newaxis]),
+        )
+    ),
+    Fault("58 under .txt, cut", of(ASCII[: len(ASCII) // 2], "log.txt"), "refused", "truncated"),
+    Fault("an ID line that names HEAD acoustics", of(uff_ascii(X, id1="; HEAD acoustics datafile format")), "read",
+          values=PRINTED[np.newaxis]),
+    Fault("an increment with a comma", of(uff_ascii(X, step="1,22070e-04")), "refused",
+          "header of record 1 is damaged"),
+    Fault("an abscissa since 1970", of(field_of(8, 30, b"1.7000000e+09")), "flagged",
+          r"its start is 2023-11-14T22:13:20\.000000\+00:00, not 2016-", F4[np.newaxis], rate_hz=8192.0),
     # units and names
     Fault("a unit in Latin-1", of(uff_binary(X, ordinate=(12, "Beschl.", b"m/s\xb2"))), "read", values=F4[np.newaxis]),
     Fault("a unit in UTF-8", of(uff_binary(X, ordinate=(12, "Beschl.", "m/s²".encode()))), "read",

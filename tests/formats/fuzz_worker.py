@@ -7,6 +7,7 @@ keep it busy for ever: neither must take the test along. Its memory is bounded.
 import faulthandler
 import json
 import os
+import re
 import resource
 import select
 import subprocess
@@ -20,6 +21,9 @@ MOST_BYTES = 2 << 30
 MOST_VALUES = 200_000
 GUARD_S = 2.0
 """What the scan of an HDF5 file may take before its guard refuses it; less than a `Reader` waits."""
+
+STEERING = re.compile("[\x00-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
+"""Signs that break a line, turn its direction or steer a terminal."""
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -59,8 +63,14 @@ def read_log(path: str) -> str:
 
 
 def _checked(error: Exception, path: str) -> str:
+    """Hold the message to one clear line, and its reason to one that the reader has thought of."""
     message = str(error)
-    assert Path(path).name in message and "\n" not in message and len(message) < 3000, message[:300]
+    assert Path(path).name in message and len(message) <= 1200, message[:300]
+    assert not STEERING.search(message), f"the message steers a terminal: {message[:300]!r}"
+    cause = error.__cause__
+    if cause is not None and f"({type(cause).__name__}: {cause}"[:50] in message:  # the last resort of `scan`
+        place = traceback.extract_tb(cause.__traceback__)[-1]
+        raise AssertionError(f"{type(cause).__name__} from a reader at {Path(place.filename).name}:{place.lineno}")
     return "refused"
 
 

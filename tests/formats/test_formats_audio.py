@@ -190,6 +190,18 @@ def test_truncated_flac(tmp_path, fraction):
         values(log)
 
 
+@pytest.mark.parametrize("suffix", ["flac", "wav"])
+def test_a_file_of_other_channels_than_were_scanned_is_refused(tmp_path, suffix):
+    path = tmp_path / f"a.{suffix}"
+    kind = {"flac": "PCM_16", "wav": "IMA_ADPCM"}[suffix]
+    noise = np.random.default_rng(0).normal(scale=0.1, size=(5000, 2))
+    soundfile.write(path, noise, 8000, subtype=kind)
+    log = scan(path)
+    soundfile.write(path, noise[:, :1], 8000, subtype=kind)
+    with pytest.raises(FormatError, match=r"a\.\w+: the file has 1 channels, and had 2 when it was scanned"):
+        values(log)
+
+
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(at=st.integers(0, 43), bit=st.integers(0, 7))
 def test_a_flipped_bit_in_the_header_never_crashes(tmp_path, at, bit):

@@ -16,7 +16,17 @@ from log_makers import chunk, lea_chunk, uff_ascii, wav_bytes
 
 from tdacoustic.errors import FormatError, MissingFileError, TdacousticError
 from tdacoustic.formats import scan
-from tdacoustic.formats.bounds import MAX_CHANNELS, MAX_FLAGS, MAX_NAME, MAX_UNIT, bounded, clean_text
+from tdacoustic.formats.bounds import (
+    MAX_CHANNELS,
+    MAX_FLAGS,
+    MAX_MESSAGE,
+    MAX_NAME,
+    MAX_UNIT,
+    ClearReader,
+    bounded,
+    clean_text,
+    clear_message,
+)
 from tdacoustic.recording import Log, LogChannel, Raster
 
 HOSTILE = "a\x00b\x1b[31m\u202eevil\u2066\u200b\r\nc\u2028d\ud800"
@@ -47,6 +57,37 @@ def path(tmp_path):
 )
 def test_cleaned_texts(text, cleaned):
     assert clean_text(text, 20 if len(text) > 40 else 40) == cleaned
+
+
+@pytest.mark.parametrize(
+    ("text", "clear"),
+    [
+        ("/a  b/log.h5: no such thing", "/a  b/log.h5: no such thing"),
+        ("log.h5: 'a\r\n\tb'\nis damaged\n", "log.h5: 'a b' is damaged"),
+        ("log.h5: 'm\x1b[2J\u202eic\x00'", "log.h5: 'm\ufffd[2J\ufffdic\ufffd'"),
+    ],
+)
+def test_messages_become_one_clear_line(text, clear):
+    assert clear_message(text) == clear == clear_message(clear)
+
+
+def test_a_long_message_keeps_the_file_and_the_reason():
+    clear = clear_message(f"log.h5: {'n' * 9000} cannot be read")
+    assert len(clear) == MAX_MESSAGE and clear.startswith("log.h5: nnn") and clear.endswith("nnn cannot be read")
+    assert clear.count(" ... ") == 1
+
+
+def test_what_a_reader_raises_becomes_one_clear_line():
+    class Raising:
+        def blocks(self, columns, start, stop, block_size):
+            yield np.zeros((1, 2))
+            raise FormatError(f"log.x: channel {HOSTILE} is cut") from OSError("disk")
+
+    blocks = ClearReader(Raising()).blocks([0], 0, 4, 2)
+    assert next(blocks).shape == (1, 2)
+    with pytest.raises(FormatError, match=r"^log\.x: channel a.*d. is cut$") as caught:
+        next(blocks)
+    assert str(caught.value).isprintable() and isinstance(caught.value.__cause__, OSError)
 
 
 def test_names_units_and_words_are_cleaned_cut_and_flagged(path):

@@ -29,7 +29,26 @@ BY_CONTENT = {
     "model.dat": (b"\x80\x04\x95\x10\x00", "pickle", "never opened"),
     "a.npy": (b"\x93NUMPY\x01\x00v\x00{'descr': '<f8'", "NumPy", "HDF5"),
     "a.wav": (b"OggS\x00\x02" + bytes(100), "loss", "FLAC"),
+    "b.wav": (b"ID3\x04\x00\x00\x00\x00\x01\x7f" + bytes(100), "loss", "FLAC"),
+    "song.csv": (b"ID3\x03\x00\x40\x00\x00\x02\x01TIT2" + b"a" * 500, "loss", "FLAC"),
+    "head.csv": (b";\r\n; Copyright 1999 HEAD acoustics GmbH\r\n; HEAD acoustics datafile format\r\nnbr: 2\r\n",
+                 "HEAD acoustics recording", "ArtemiS SUITE"),
+    "log.bz2.csv": (b"BZh91AY&SY" + bytes(50), "archive", "unpack"),
+    "logs.tar.dat": (b"a.wav".ljust(257, b"\x00") + b"ustar\x0000" + bytes(300), "archive", "unpack"),
 }  # fmt: skip
+
+
+NOT_CLOSED = [
+    b"HEAD acoustics;mic\n", b"# HEAD acoustics datafile format\n", b"x\n; HEAD acoustics datafile format\n",
+    b"ID3,mic\n", b"ID3 is a channel\n", b"ID3", b"ID3\x09\x00\x00\x00\x00\x00\x00",
+    b"ID3\x04\x00\x00\xff\x00\x00\x00", b"OggS,mic\n", b"BZh;mic\n", b"|CF,mic|\n", b"%PDF-export\n",
+    b"a" * 257 + b"ustar;mic\n",    b'<?xml version="1.0"?><a>usi:tdm</a>',
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("head", NOT_CLOSED)
+def test_words_that_a_closed_format_begins_with_are_not_that_format(head):
+    assert closed_by_content(".csv", head) is None
 
 
 @pytest.mark.parametrize("name", list(BY_CONTENT))

@@ -248,6 +248,6 @@ def test_rows_over_many_pieces(log_of, quoted, monkeypatch):
     x = np.random.default_rng(0).normal(size=(3000, 2))
     mark = '"' if quoted else ""
     log = log_of("a,b\n" + "".join(f"{mark}{a!r}{mark},{mark}{b!r}{mark}\n" for a, b in x.tolist()) + "\n\n")
-    assert len(log.reader.rows.checkpoints) > 50
+    assert len(log.reader.reader.rows.checkpoints) > 50
     assert np.array_equal(values(log), x.T)
     assert np.array_equal(next(log.reader.blocks([1], 2345, 2999, 1000))[0], x[2345:2999, 1])

@@ -1,4 +1,7 @@
-"""Every row of the fault tables comes to what the row says: no traceback, no silent wrong number."""
+"""Every row of the fault tables comes to what the row says: no traceback, no silent wrong number.
+
+What is flagged is also said by ``tdacoustic info``.
+"""
 
 import importlib
 import re
@@ -6,9 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fault_table import NOT_HELD
+from fuzz_worker import STEERING
 
 from tdacoustic.errors import TdacousticError
 from tdacoustic.formats import scan
+from tdacoustic.formats.bounds import MAX_MESSAGE
+from tdacoustic.workflows.info import describe_log, info_text
 
 MODULES = sorted(path.stem for path in Path(__file__).parent.glob("faults_*.py"))
 ROWS = [
@@ -37,14 +44,18 @@ def test_fault(fault, tmp_path):
         message = str(caught.value)
         assert path.name in message, message
         assert re.search(fault.says, message), message
-        assert "\n" not in message and len(message) < 2000
+        assert not STEERING.search(message) and len(message) <= MAX_MESSAGE
         return
     log, values = read_all(path)
     flags = [*log.flags, *(flag for channel in log.channels for flag in channel.flags)]
     if fault.outcome == "flagged":
         assert any(re.search(fault.says, flag) for flag in flags), flags
+        said = info_text(describe_log(path))
+        assert re.search(fault.says, said), said
     else:
         assert not flags
+    if fault.rate_hz != NOT_HELD:
+        assert {channel.raster.sample_rate_hz for channel in log.channels} == {fault.rate_hz}
     if fault.values is not None:
         assert len(values) == len(fault.values)
         for found, wanted in zip(values, fault.values, strict=True):

@@ -146,14 +146,15 @@ def test_a_time_vector_gives_the_rate_and_is_no_channel(path):
 
 
 @pytest.mark.parametrize("gap_at", [3, 2500, 4990])
-def test_a_time_vector_with_a_gap_gives_no_rate(path, gap_at):
+def test_what_is_over_a_time_vector_with_a_gap_is_left_out(path, gap_at):
     t = np.arange(5000) / 51200
     t[gap_at:] += 3 / 51200
     with h5py.File(path, "w") as file:
-        file["t"], file["mic"] = t, np.zeros(5000)
+        file["t"], file["mic"], file["both"], file["longer"] = t, np.zeros(5000), np.zeros((2, 5000)), np.zeros(5001)
     log = scan(path)
-    assert by_name(log)["mic"].raster.sample_rate_hz is None
-    assert any("'t' is called a time but is not equidistant" in flag for flag in log.flags)
+    assert list(by_name(log)) == ["longer"]
+    (flag,) = log.flags
+    assert "2 skipped" in flag and "'t' is called a time but is not equidistant" in flag and "both, mic" in flag
 
 
 def test_contradicting_rates_are_flagged(path):
@@ -170,7 +171,7 @@ def test_what_is_no_channel_is_skipped_and_flagged(path):
         file["x"] = np.zeros(10)
         file["text"] = "hello"
         file["texts"] = ["a", "b"]
-        file["flag"] = np.zeros(10, bool)
+        file["state"] = np.zeros(10, h5py.enum_dtype({"OFF": 0, "ON": 1, "FAULT": 2}, "i1"))
         file["compound"] = np.zeros(10, dtype=[("a", "f8"), ("b", "i4")])
         file["complex"] = np.zeros(10, complex)
         file["scalar"] = 3.0
@@ -180,7 +181,7 @@ def test_what_is_no_channel_is_skipped_and_flagged(path):
     log = scan(path)
     assert [c.name for c in log.channels] == ["x"]
     text = " ".join(log.flags)
-    assert all(name in text for name in ("text", "flag", "compound", "complex", "scalar", "cube", "empty", "refs"))
+    assert all(name in text for name in ("text", "state", "compound", "complex", "scalar", "cube", "empty", "refs"))
 
 
 def test_nothing_outside_the_file_is_read(path, tmp_path):

@@ -49,7 +49,7 @@ def values_of(log, start=0, stop=None):
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 def test_by_the_time_column(tmp_path, looks, never_counted, times, end):
     log = scan(write(tmp_path / "a.csv", rows_of(times), end=end))
-    assert not log.reader.rows.checked and len(log.reader.rows.checkpoints) > 10
+    assert not log.reader.reader.rows.checked and len(log.reader.reader.rows.checkpoints) > 10
     assert (log.channels[0].raster.n_samples, log.channels[0].raster.sample_rate_hz) == (N, RATE_HZ)
     assert log.flags == ()
     assert np.array_equal(values_of(log), VALUES)
@@ -60,7 +60,7 @@ def test_by_the_time_column(tmp_path, looks, never_counted, times, end):
 def test_every_row_that_is_placed_begins_where_it_is_said_to(tmp_path, looks, never_counted):
     path = write(tmp_path / "a.csv", rows_of())
     content = path.read_bytes()
-    for row, offset in scan(path).reader.rows.checkpoints:
+    for row, offset in scan(path).reader.reader.rows.checkpoints:
         assert content[:offset].count(b"\n") == row + 1
 
 
@@ -82,7 +82,7 @@ def test_line_ends_over_many_pieces(tmp_path, looks, never_counted, monkeypatch)
     path.write_bytes(path.read_bytes()[:-1] + b"\n" * 200)
     log = scan(path)
     assert log.channels[0].raster.n_samples == 2000
-    for row, offset in log.reader.rows.checkpoints:
+    for row, offset in log.reader.reader.rows.checkpoints:
         assert path.read_bytes()[:offset].count(b"\n") == row + 1
     assert np.array_equal(values_of(log, 1500, 2000), VALUES[1500:2000])
 

@@ -83,6 +83,52 @@ def test_two_resonances_and_a_line_fixed_in_hz_are_told_apart():
     assert np.isnan(found[1].loss_factor) and "no loss factor" in found[1].evidence
 
 
+def tone(frequency_hz, rms):
+    return rms * np.sqrt(2.0) * np.cos(2.0 * np.pi * frequency_hz * RUN.times)
+
+
+def fixed(samples):
+    return [(item.kind, item.frequency_hz) for item in found_in(samples)]
+
+
+@pytest.mark.parametrize(("frequency_hz", "rms", "seed"), [(550.0, 2.0, 1), (333.3, 1.0, 3), (761.9, 4.0, 2)])
+def test_a_line_as_strong_as_the_orders_is_no_resonance(frequency_hz, rms, seed):
+    """Each order that meets it is raised there, by what the line has and not by a part of its own."""
+    assert fixed(excitation(seed) + tone(frequency_hz, rms)) == [("line", pytest.approx(frequency_hz, abs=0.3))]
+
+
+def test_a_line_whose_level_follows_the_torque_is_no_resonance():
+    course = 10.0 ** (0.15 * np.cos(2.0 * np.pi * RUN.times / RUN.duration_s))  # 6 dB up and down
+    assert fixed(excitation(1) + course * tone(550.0, 2.0)) == [("line", pytest.approx(550.0, abs=0.3))]
+
+
+@pytest.mark.parametrize("resonance_hz", [450.0, 500.0, 620.0, 700.0])
+def test_a_resonance_beside_a_strong_line_is_the_only_one(resonance_hz):
+    driven = excitation(2)
+    found = fixed(driven + resonator(driven, resonance_hz, 0.04, 5.0) + tone(550.0, 2.0))
+    assert sorted(found) == [
+        ("line", pytest.approx(550.0, abs=0.3)),
+        ("resonance", pytest.approx(resonance_hz, rel=0.015)),
+    ]
+
+
+def test_a_resonance_that_lifts_orders_above_a_line_at_its_frequency_is_found():
+    driven = excitation(1)
+    line, found = found_in(driven + resonator(driven, 550.0, 0.04, 5.0) + tone(550.0, 0.5))
+    assert (line.kind, found.kind) == ("line", "resonance") and found.orders_raised == 3
+    assert (line.frequency_hz, found.frequency_hz) == (pytest.approx(550.0, abs=0.3), pytest.approx(550.0, rel=0.015))
+    assert "hides some of them" in found.evidence
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_resonance_of_noise_alone_is_no_line(seed):
+    """The orders do not pass through it; where they meet its noise they are raised."""
+    noise = RUN.noise(1e-4, seed + 50)
+    assert fixed(excitation(seed) + resonator(noise, 700.0, 0.04, 30.0)) == [
+        ("resonance", pytest.approx(700.0, rel=0.02))
+    ]
+
+
 def test_too_little_is_refused():
     with pytest.raises(AnalysisError, match="got 'order'"):
         find_fixed_frequencies((), type("Map", (), {"domain": "order"})())

@@ -6,8 +6,10 @@ import pytest
 
 from tdacoustic.errors import UnitError
 from tdacoustic.sensors import parse_calibrator, series_of
+from tdacoustic.sensors.calibrator_check import CalibratorRun, ChannelScale
 from tdacoustic.sensors.calibrators import likely_mistake
-from tdacoustic.sensors.checking import CalibratorRun, ChannelScale, calibrate_channel, check_tone
+from tdacoustic.sensors.channel_calibration import calibrate_channel
+from tdacoustic.sensors.checking import check_tone
 from tdacoustic.sensors.reading import Plateau, ToneReading
 
 VOLTS = ChannelScale("mic", "V")

@@ -94,7 +94,11 @@ def test_two_recorders_are_put_on_one_axis(tmp_path):
     assert "b.h5" not in mic.scaling
     assert np.array_equal(recording.samples("motor"), h5py.File(tmp_path / "b.h5")["motor"][:].astype(float))
     quality = found.tables["quality"]
-    assert "nothing is resampled" in quality[quality["check"] == "clock"]["detail"].iloc[0]
+    (clock,) = quality[quality["check"] == "clock"].to_dict("records")
+    assert "nothing is resampled" in clock["detail"]
+    assert "one channel has the other's sign turned round" in clock["detail"]
+    assert (clock["verdict"], row["inverted"]) == ("ok", True)  # known, and of no harm
+    assert not row["doubt"] or row["doubt"] != row["doubt"]
     assert any(record.step == "clock" for _, record in found.records)
     # the tacho of one log serves the microphone of the other: order 4 of 0.2 Pa rms / sqrt(2) keeps its level
     levels = order_levels(found)
@@ -111,6 +115,7 @@ def test_the_report_says_how_the_logs_lie(tmp_path):
     text = str(section)
     assert "b.h5 starts at 0.37" in text
     assert "20 ppm" in text
+    assert "the sign turned round" in text
 
 
 def test_a_channel_of_each_log_can_hold_the_signal(tmp_path):

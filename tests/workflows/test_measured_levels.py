@@ -17,6 +17,28 @@ LEFT = {"distance_m": 4.0, "height_above_rail_m": 1.2, "side": "left"}
 # ------------------------------------------------------------ overall levels
 
 
+def test_microphones_that_are_doubtful_by_calibrator_are_said(tmp_path):
+    """The left one's sensitivity is stated 3 dB too high; the far one's too, but it feeds no 4 m level."""
+    true_volts = {"left": 0.05, "right": 0.05, "far": 0.05}
+    stated = {"left": 50.0 * 10 ** (3 / 20), "right": 50.0, "far": 100.0}
+    channels = "".join(
+        mic(name, distance_m=distance_m, sensitivity=f"{stated[name]:.6g} mV/Pa")
+        for name, distance_m in (("left", 4.0), ("right", 4.0), ("far", 7.5))
+    )
+    calibrator = {name: (tone(94.0, 1000.0, 12.0) * volts, "V") for name, volts in true_volts.items()}
+    drive = {name: (tone(80.0, 500.0) * volts, "V") for name, volts in true_volts.items()}
+    before = table("run", name="cal", kind="calibration_before", logs=["cal.h5"], calibrator="94 dB")
+    made = Made(tmp_path, channels, [before, run_of("a", "a1")], {"cal": calibrator, "a1": drive})
+    (datum,), doubts = made.levels()
+    said = [doubt for doubt in doubts if "doubtful by calibrator" in doubt]
+    assert len(said) == 1
+    assert said[0].startswith("channel left: doubtful by calibrator (read -3.00 dB off the stated scale, more than 0.5")
+    # the level itself stays: 80 dB of the right one, 77 of the left one
+    assert datum.level_db == pytest.approx(10 * math.log10((1e8 + 10**7.7) / 2), abs=0.01)
+    _, doubts = made.levels("receivers")
+    assert {doubt.split(":")[0] for doubt in doubts if "by calibrator" in doubt} == {"channel left", "channel far"}
+
+
 def test_the_4_m_level_is_the_energy_mean_over_runs_and_receivers(tmp_path):
     levels = {"a1": ("a", {"left": 80.0, "right": 90.0, "far": 60.0}), "a2": ("a", {"left": 80.0, "right": 90.0})}
     channels = mic("left", distance_m=4.0) + mic("right", distance_m=4.19) + mic("far", distance_m=7.5)

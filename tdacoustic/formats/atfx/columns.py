@@ -14,6 +14,7 @@ from tdacoustic.formats.atfx.components import ComponentFiles, NotNumbersError
 from tdacoustic.formats.atfx.document import ComponentText, InlineText, Instance
 from tdacoustic.formats.atfx.graph import Graph, label_of
 from tdacoustic.formats.atfx.values import Component, Implicit, Inline, Part, find_inline
+from tdacoustic.formats.integers import full_scale_of
 from tdacoustic.units import parse_unit
 
 __all__ = ["Column", "Source", "Unit", "read_column"]
@@ -140,7 +141,7 @@ def read_column(
         if global_flag and "flags" not in column.arrays and not _is_valid(graph.count(column, "global_flag")):
             raise NotNumbersError(f"its global flag, {global_flag[:20]}, says that its values are not valid")
         source = _source(path, stream, graph, files, column, n_rows)
-        limits, full_scale = _limits(column, source, unit)
+        limits, full_scale = _limits(column, source, unit, flags)
     except NotNumbersError as error:
         reason = str(error)
     if source is not None and n_rows is not None and source.n_values != n_rows:
@@ -268,24 +269,28 @@ def _flags(
     return found
 
 
-def _limits(column: Instance, source: Source, unit: Unit) -> tuple[tuple[float, float] | None, float | None]:
+def _limits(
+    column: Instance, source: Source, unit: Unit, flags: list[str]
+) -> tuple[tuple[float, float] | None, float | None]:
     """Ends of the stored type, and full scale where there is neither a unit nor a scaling."""
     part = source.parts[0]
     if isinstance(part, Component) and np.dtype(part.dtype).kind in "iu":
         info = np.iinfo(part.dtype)
-        low, high, bits = float(info.min), float(info.max), info.bits
+        low, high = float(info.min), float(info.max)
     elif isinstance(part, Inline) and isinstance(array := column.arrays["values"], InlineText):
         if array.kind.lower() not in INLINE_INTEGERS:
             return None, None
         low, high = map(float, INLINE_INTEGERS[array.kind.lower()])
-        bits = int(math.log2(high - low + 1.0))
     else:
         return None, None
     if len(source.coefficients) > 2:
         return None, None
     constant, factor = source.coefficients or (0.0, 1.0)
     ends = sorted((constant + factor * low, constant + factor * high))
-    full_scale = 2.0 ** (bits - 1) if unit.name is None and not source.coefficients else None
+    full_scale = None
+    if unit.name is None and not source.coefficients:
+        full_scale, notes = full_scale_of(low, high)
+        flags.extend(notes)
     return (ends[0], ends[1]), full_scale
 
 

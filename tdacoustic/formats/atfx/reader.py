@@ -37,7 +37,7 @@ from tdacoustic.formats.atfx.values import (
     component_pieces,
     pieces,
 )
-from tdacoustic.formats.blocks import check_request, rebuffered, unique_names
+from tdacoustic.formats.blocks import check_request, in_asked_order, rebuffered, unique_names
 from tdacoustic.recording import Log, LogChannel, Raster
 from tdacoustic.units import quantity_of_unit
 
@@ -81,15 +81,8 @@ class AtfxReader:
         slab = max(1 << 13, min(SLAB_BYTES, MAX_CHANNELS_AT_ONCE_BYTES // max(1, len(chosen))))
         with ExitStack() as stack:
             streams = _Streams(self.path, self.identities, stack)
-            parts = [
-                rebuffered(self._pieces(streams, [chosen[row] for row in group], start, stop, slab), block_size)
-                for group in groups
-            ]
-            rows = [row for group in groups for row in group]
-            order = None if rows == sorted(rows) else np.argsort(rows)
-            for arrays in zip(*parts, strict=True):
-                block = arrays[0] if len(arrays) == 1 else np.concatenate(arrays)
-                yield block if order is None else block[order]
+            parts = [self._pieces(streams, [chosen[row] for row in group], start, stop, slab) for group in groups]
+            yield from in_asked_order(parts, groups, block_size)
 
     def _pieces(
         self, streams: _Streams, sources: Sequence[Source], start: int, stop: int, slab: int

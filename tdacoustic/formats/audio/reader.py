@@ -117,6 +117,11 @@ class AudioReader:
         position = start
         try:
             with self.path.open("rb") as stream, self._open(stream) as sound:
+                if sound.channels != self.n_channels:
+                    raise FormatError(
+                        f"{self.path}: the file has {sound.channels} channels, and had {self.n_channels} when it was "
+                        "scanned"
+                    )
                 sound.seek(start)
                 for first, last in spans(start, stop, block_size):
                     block = np.empty((len(chosen), last - first))
@@ -230,6 +235,11 @@ def _library_reader(path: Path, header: WaveHeader) -> AudioReader:
         info = soundfile.info(str(path))
     except soundfile.SoundFileError as error:
         raise FormatError(f"{path}: WAV format {header.format_tag} with {header.bits} bits cannot be read") from error
+    if info.channels != header.n_channels:
+        raise FormatError(
+            f"{path}: damaged fmt chunk: it says {header.n_channels} channels, "
+            f"WAV format {header.format_tag} in it has {info.channels}"
+        )
     return AudioReader(path, info.channels, info.frames, (1.0,) * info.channels)
 
 

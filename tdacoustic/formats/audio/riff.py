@@ -114,7 +114,10 @@ def _walk(path: Path, stream: BinaryIO, header: WaveHeader) -> None:
             header.flags.append(left)
             return
         if name == b"ds64" and size >= 16:
-            ds64_data_size = struct.unpack("<QQ", stream.read(16))[1]
+            sizes = stream.read(16)
+            if len(sizes) < 16:
+                raise FormatError(f"{path}: truncated: the file ends in its ds64 chunk")
+            ds64_data_size = struct.unpack("<QQ", sizes)[1]
         elif name == b"fmt " and not header.n_channels:
             _read_fmt(path, stream.read(min(size, 64)), header)
         elif name == b"data" and not header.data_offset:
@@ -135,15 +138,15 @@ def _walk(path: Path, stream: BinaryIO, header: WaveHeader) -> None:
             return
         elif name in KEPT_CHUNKS and size <= MAX_KEPT_BYTES and name not in header.kept:
             header.kept[name] = stream.read(size)
-        position = body + size + _padding(stream, body, size)
+        position = body + size
+        if size % 2 and position < header.file_size:
+            position += _padding(stream, position)
     header.flags.append(f"more than {MAX_CHUNKS} chunks: the rest is not read")
 
 
-def _padding(stream: BinaryIO, body: int, size: int) -> int:
+def _padding(stream: BinaryIO, end: int) -> int:
     """One byte after an odd chunk, unless the writer forgot it."""
-    if size % 2 == 0:
-        return 0
-    stream.seek(body + size)
+    stream.seek(end)
     following = stream.read(5)
     return 0 if _is_chunk_id(following[:4]) and not _is_chunk_id(following[1:]) else 1
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections import Counter
@@ -69,7 +70,7 @@ class Layout:
 
 
 def split_row(line: str, delimiter: str) -> list[str]:
-    """Split one line into its fields, stripped.
+    """Split one line into its fields, stripped; quotes count where they are those of a table.
 
     Examples
     --------
@@ -78,7 +79,10 @@ def split_row(line: str, delimiter: str) -> list[str]:
     """
     if delimiter == WHITESPACE:
         return line.split()
-    cells = next(csv.reader([line], delimiter=delimiter), []) if '"' in line else line.split(delimiter)
+    cells = line.split(delimiter)
+    if '"' in line:
+        with contextlib.suppress(csv.Error):  # a CR between the fields, or a cell of more than 130 kB
+            cells = next(csv.reader([line], delimiter=delimiter), [])
     return [cell.strip() for cell in cells]
 
 
@@ -120,6 +124,7 @@ def read_layout(path: Path) -> Layout:
     if not whole:
         raw_lines.pop()
     lines = [decoded(line, encoding).rstrip("\r") for line in raw_lines]
+    _refuse_cr_among_quotes(path, lines)
     delimiter, decimal, n_fields, mask = _dialect(path, lines)
     first = _first_row(lines, delimiter, decimal, n_fields, mask)
     if first is None:
@@ -144,6 +149,13 @@ def read_layout(path: Path) -> Layout:
         _metadata(lines[:used]),
         tuple(flags),
     )
+
+
+def _refuse_cr_among_quotes(path: Path, lines: Sequence[str]) -> None:
+    """Raise where a line with quotes has a CR outside them: whether a row ends there cannot be told."""
+    for number, line in enumerate(lines, 1):
+        if '"' in line and "\r" in re.sub('"[^"]*"', "", line):
+            raise FormatError(f"{path}: line {number}: a CR between its fields, in a text whose lines end in LF")
 
 
 def _sample(path: Path, lines: Sequence[str]) -> list[str]:

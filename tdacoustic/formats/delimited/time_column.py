@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.delimited.layout import Layout
+from tdacoustic.formats.rates import thousands_doubt
 
 __all__ = [
     "TimeAxis",
@@ -56,8 +57,9 @@ RATE_KEYS = re.compile(
     r"(sampl(?:e|ing)(?:rate|frequency|freq)|abtast(?:rate|frequenz)|fs|samplespersecond|frequencesampling)(hz|khz)?"
 )
 INTERVAL_KEYS = re.compile(
-    r"(sampl(?:e|ing)(?:interval|period|time)|dt|deltat|deltax|timestep|xincrement|abtastintervall)(s|ms|us)?"
+    r"(sampl(?:e|ing)(?:interval|period)|dt|deltat|deltax|timestep|(?:wf|x)?increment|abtastintervall)(s|ms|us)?"
 )
+"""What can mean nothing else: a sampling time may be that of the whole measurement, ``t_s`` any time in seconds."""
 ROW_KEYS = re.compile(r"(?:number|no|num|n|anzahl)?(?:of|der)?(?:samples|datapoints|messwerte|rows)")
 START_KEYS = re.compile(
     r"(?:start|date|datum|recorded|measured|trigger|begin)(?:time|date|datetime|zeit)?|datetime|timestamp|acquisitiontime"
@@ -245,6 +247,9 @@ def stated_rate_hz(layout: Layout) -> tuple[float | None, tuple[str, ...]]:
     rates: list[float] = []
     for keys, units in ((RATE_KEYS, RATE_UNITS), (INTERVAL_KEYS, {"": 1.0, **TIME_UNITS})):
         for unit_in_key, value in _stated(layout, keys):
+            doubt = thousands_doubt(f"{value} {unit_in_key}")
+            if doubt is not None:
+                return None, (f"the heading states a sampling rate: {doubt}",)
             parsed = _number_and_unit(value)
             factor = None if parsed is None else units.get(parsed[1] or unit_in_key)
             if parsed is None or factor is None or not parsed[0] > 0.0:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tdacoustic.formats.rates import snap_rate
+from tdacoustic.formats.rates import number_in, snap_rate, thousands_doubt
 
 __all__ = ["Attributes"]
 
@@ -29,14 +29,24 @@ RATE_NAMES = frozenset(
     }
 )
 INTERVAL_NAMES = frozenset(
-    {"dt", "dts", "deltat", "wfincrement", "samplinginterval", "samplingintervals", "timestep", "timesteps"}
+    {
+        *("dt", "dts", "deltat", "deltats", "timestep", "timesteps", "wfincrement", "increment", "xincrement"),
+        *("sampleinterval", "sampleintervals", "samplinginterval", "samplingintervals", "sampleperiod"),
+        *("samplingperiod",),
+    }
 )
+"""Those that can mean nothing else: ``t_s`` may be any time in seconds."""
+
 MAX_TEXT = 1000
 MAX_ATTRIBUTE_BYTES = 1 << 20
 MAX_ATTRIBUTES = 1000
+MAX_MISSING = 16
 
 
-def _plain(name: str) -> str:
+def _plain(name: str | bytes) -> str:
+    """Letters and digits of a name in lower case; none where it is bytes, as h5py has names that are not UTF-8."""
+    if isinstance(name, bytes):
+        return ""
     return "".join(character for character in name.lower() if character.isalnum())
 
 
@@ -51,18 +61,24 @@ class Attributes:
     def __init__(self, owner: Any) -> None:
         self._owner = owner
 
-    def _value(self, name: str) -> Any:
-        """One scalar value, None where there is none or it is a reference or an array."""
+    def _length(self, name: str) -> int:
+        """How many numbers or texts an attribute holds, 0 where it is not there or holds something else."""
         attributes = self._owner.attrs
         if name not in attributes:
-            return None
+            return 0
         try:
             stored = attributes.get_id(name)
-            if stored.dtype.kind not in "iufSUO" or math.prod(stored.shape or (1,)) != 1:
-                return None
-            if stored.dtype.itemsize > MAX_ATTRIBUTE_BYTES:
-                return None
-            value = attributes[name]
+            fits = stored.dtype.kind in "iufSUO" and stored.dtype.itemsize <= MAX_ATTRIBUTE_BYTES
+            return math.prod(stored.shape or (1,)) if fits else 0
+        except (OSError, TypeError, ValueError, KeyError, RuntimeError):
+            return 0
+
+    def _value(self, name: str) -> Any:
+        """One scalar value, None where there is none or it is a reference or an array of several."""
+        if self._length(name) != 1:
+            return None
+        try:
+            value = self._owner.attrs[name]
         except (OSError, TypeError, ValueError, KeyError, RuntimeError):
             return None
         if isinstance(value, np.ndarray):
@@ -90,8 +106,27 @@ class Attributes:
                 return number
         return None
 
-    def rate(self, inherited: bool) -> tuple[float | None, float | None]:
-        """Sampling rate in Hz, and as stored where it was snapped.
+    def several(self, *names: str) -> str | None:
+        """Name of the first of the attributes that is there, where it holds several values."""
+        name = next((name for name in names if self._length(name)), None)
+        return name if name is not None and self._length(name) > 1 else None
+
+    def missing(self) -> dict[str, tuple[float, ...]]:
+        """Stored numbers that stand for a missing value, by the attribute that says so (NetCDF's conventions)."""
+        found = {}
+        for name in ("_FillValue", "missing_value"):
+            if not 1 <= self._length(name) <= MAX_MISSING:
+                continue
+            try:
+                numbers = np.atleast_1d(self._owner.attrs[name]).reshape(-1)
+            except (OSError, TypeError, ValueError, KeyError, RuntimeError):
+                continue
+            if numbers.dtype.kind in "iuf":
+                found[name] = tuple(number.item() for number in numbers)
+        return found
+
+    def rate(self, inherited: bool) -> tuple[float | None, float | None, tuple[str, ...]]:
+        """Sampling rate in Hz, as stored where it was snapped, and why one that is stated is not taken.
 
         Parameters
         ----------
@@ -99,18 +134,23 @@ class Attributes:
             Look at the groups above too.
         """
         owner = self._owner
+        doubts: list[str] = []
         while True:
             for name in islice(owner.attrs, MAX_ATTRIBUTES):
                 plain = _plain(name)
-                number = _number(Attributes(owner)._value(name)) if plain in RATE_NAMES | INTERVAL_NAMES else None
-                if number is None:
+                value = Attributes(owner)._value(name) if plain in RATE_NAMES | INTERVAL_NAMES else None
+                doubt = thousands_doubt(value) if isinstance(value, str) else None
+                if doubt is not None:
+                    doubts.append(f"{name!r}: {doubt}")
+                number = _number(number_in(value) if isinstance(value, str) else value)
+                if number is None or doubt is not None:
                     continue
                 if plain in RATE_NAMES:
-                    return snap_rate(number)
+                    return (*snap_rate(number), ())
                 if number > 0.0:
-                    return snap_rate(1.0 / number)
+                    return (*snap_rate(1.0 / number), ())
             if owner.name in (None, "/"):
-                return None, None
+                return None, None, tuple(doubts[:1])
             above = owner.parent
             owner = above if inherited else above.file["/"]
 

@@ -13,7 +13,10 @@ one of two dimensions one channel per column, ``path[1]``, ``path[2]``, ..., wit
 time along the longer axis (or along the axis that an attribute ``time_axis``, 0
 or 1, names). Rate and unit come from attributes under the usual names, on the
 dataset or on the groups above it. An equidistant dataset called ``time`` or ``t``
-gives its neighbours of the same length their rate.
+gives its neighbours of the same length their rate; where it is not equidistant, they
+are left out. Datasets of true and false are 0 and 1, without a unit.
+
+In both, stored numbers that ``_FillValue`` or ``missing_value`` names are NaN.
 
 Nothing is read from outside the file: soft and external links, virtual datasets
 and external storage are skipped with a flag. No filter is loaded from a folder of
@@ -32,13 +35,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.blocks import check_request, rebuffered
+from tdacoustic.formats.blocks import by_origin, check_request, in_asked_order
 from tdacoustic.formats.bounds import MAX_CHANNELS
 from tdacoustic.formats.hdf5 import guard
 from tdacoustic.formats.hdf5.attributes import Attributes
-from tdacoustic.formats.hdf5.tree import Tree, read_tree
-from tdacoustic.recording import Log, LogChannel, Raster
-from tdacoustic.units import QUANTITIES, quantity_of_unit
+from tdacoustic.formats.hdf5.channels import Source, channels_of
+from tdacoustic.formats.hdf5.times import TimeVectors, time_vectors
+from tdacoustic.formats.hdf5.tree import read_tree, skipped_flags
+from tdacoustic.recording import Log, LogChannel
 
 __all__ = ["Hdf5Reader", "Source", "forbid_plugins", "opened", "scan_file", "scan_here"]
 
@@ -48,29 +52,6 @@ SLAB_BYTES = 8 << 20
 
 MAX_SLAB_BYTES = 192 << 20
 """Where packed chunks are so long that one of each would exceed this, they are unpacked more than once."""
-
-
-@dataclass(frozen=True)
-class Source:
-    """Where a channel's samples lie, and ``value = stored * scale + offset``.
-
-    Parameters
-    ----------
-    dataset : str
-        Path in the file.
-    n_samples : int
-    time_axis : int
-    column : int or None
-        None for a one-dimensional dataset.
-    scale, offset : float
-    """
-
-    dataset: str
-    n_samples: int
-    time_axis: int = 0
-    column: int | None = None
-    scale: float = 1.0
-    offset: float = 0.0
 
 
 def forbid_plugins() -> None:
@@ -118,22 +99,12 @@ class Hdf5Reader:
         """
         chosen = [self.sources[column] for column in columns]
         check_request(self.path, min((source.n_samples for source in chosen), default=0), start, stop, block_size)
-        rows: dict[str, list[int]] = {}
-        for row, source in enumerate(chosen):
-            rows.setdefault(source.dataset, []).append(row)
+        rows = by_origin(source.dataset for source in chosen)
         with opened(self.path) as file:
-            parts = [
-                rebuffered(self._slabs(file, [chosen[row] for row in members], start, stop, len(rows)), block_size)
-                for members in rows.values()
+            slabs = [
+                self._slabs(file, [chosen[row] for row in members], start, stop, len(rows)) for members in rows.values()
             ]
-            if len(parts) == 1:
-                yield from parts[0]
-                return
-            order = np.argsort([row for members in rows.values() for row in members])
-            as_asked = bool((order == np.arange(order.size)).all())
-            for pieces in zip(*parts, strict=True):
-                joined = np.concatenate(pieces)
-                yield joined if as_asked else joined[order]
+            yield from in_asked_order(slabs, rows.values(), block_size)
 
     def _slabs(
         self, file: Any, sources: Sequence[Source], start: int, stop: int, n_datasets: int
@@ -171,7 +142,10 @@ class Hdf5Reader:
             values = np.array(
                 stored[picked] if len(picked) > 1 else stored[picked[0] : picked[0] + 1], dtype=np.float64
             )
-            yield values * scale + offset if scaled else values
+            values = values * scale + offset if scaled else values
+            if sources[0].missing:
+                values[sources[0].is_missing(stored[picked])] = np.nan
+            yield values
             position = end
 
 
@@ -206,127 +180,24 @@ def scan_here(path: Path) -> Log:
         flags = list(tree.flags)
         if schema is not None and schema.startswith("tdacoustic-log/") and not ours:
             flags.append(f"schema is {schema!r}; this version knows {SCHEMA!r}")
-        times = {} if ours else _time_vectors(file, tree, flags)
-        vectors = {vector for vector, _, _, _ in times.values()}
-        channels: list[LogChannel] = []
-        sources: list[Source] = []
+        times = TimeVectors() if ours else time_vectors(file, tree.datasets)
+        found: list[tuple[LogChannel, Source]] = []
         for name in tree.datasets:
-            if name not in vectors:
-                _add(path, file, name, times, ours, channels, sources)
-            if len(channels) > MAX_CHANNELS:
+            if name not in times.names:
+                found.extend(channels_of(path, file[name], name, times, ours))
+            if len(found) > MAX_CHANNELS:
                 raise FormatError(f"{path}: more than {MAX_CHANNELS} channels")
-        if not channels:
+        flags += [*times.flags, *skipped_flags(times.left_out)]
+        if not found:
             reasons = "; ".join(flags) or "no dataset in it"
             raise FormatError(f"{path}: no numeric dataset of one or two dimensions ({reasons})")
         metadata = tuple((key, text) for key in ("description", "title", "comment") if (text := root.text(key)))
         return Log(
             path,
             "hdf5",
-            tuple(channels),
-            Hdf5Reader(path, tuple(sources)),
+            tuple(channel for channel, _ in found),
+            Hdf5Reader(path, tuple(source for _, source in found)),
             start_time=root.text("start_time", "start", "recording_start", "wf_start_time"),
             flags=tuple(flags),
             metadata=(*((("schema", schema),) if schema else ()), *metadata),
         )
-
-
-TimeVectors = dict[tuple[str, int], tuple[str, float, float, float | None]]
-
-
-def _time_vectors(file: Any, tree: Tree, flags: list[str]) -> TimeVectors:
-    """Return (group, length) -> (name, rate, start, raw rate) of the equidistant time vectors."""
-    from tdacoustic.formats.hdf5.tree import raster_of_time_vector
-
-    found: TimeVectors = {}
-    lengths: dict[tuple[str, int], int] = {}
-    for name in tree.datasets:
-        for length in set(file[name].shape):
-            key = (name.rpartition("/")[0], length)
-            lengths[key] = lengths.get(key, 0) + 1
-    for name in tree.datasets:
-        group, dataset = name.rpartition("/")[0], file[name]
-        if dataset.ndim != 1 or (group, len(dataset)) in found or lengths[(group, len(dataset))] < 2:
-            continue
-        raster = raster_of_time_vector(name, dataset)
-        if raster is None:
-            continue
-        if isinstance(raster, str):
-            flags.append(raster)
-            continue
-        found[(group, len(dataset))] = (name, *raster)
-    return found
-
-
-def _add(
-    path: Path,
-    file: Any,
-    name: str,
-    times: TimeVectors,
-    ours: bool,
-    channels: list[LogChannel],
-    sources: list[Source],
-) -> None:
-    """Append the channels of one dataset."""
-    dataset = file[name]
-    own = Attributes(dataset)
-    flags = list(own.storage_flags())
-    axis = _time_axis(dataset, own, flags)
-    n_samples = int(dataset.shape[axis])
-    rate, raw = own.rate(inherited=not ours)
-    start_s = own.number("start_s", "wf_start_offset") or 0.0
-    time = times.get((name.rpartition("/")[0], n_samples))
-    if time is not None:
-        vector, time_rate, start_s, time_raw = time
-        if rate is None:
-            rate, raw = time_rate, time_raw
-        elif abs(time_rate - rate) > 1e-4 * rate:
-            flags.append(f"an attribute says {rate:.9g} Hz, {vector!r} says {time_rate:.9g} Hz: the attribute is taken")
-    try:
-        raster = Raster(rate, n_samples, start_s, raw)
-    except FormatError as error:
-        raise FormatError(f"{path}: dataset {name!r}: {error}") from error
-    unit = own.text("unit", "units", "unit_string", "wf_yunit", "yunit") or None
-    quantity = own.text("quantity")
-    if quantity is not None and quantity not in QUANTITIES:
-        flags.append(f"quantity {quantity!r} is not known: {', '.join(QUANTITIES)}")
-        quantity = None
-    scale, offset = own.number("scale", "scale_factor"), own.number("offset", "add_offset") or 0.0
-    full_scale, limits = _full_scale(dataset.dtype, unit, scale, offset)
-    common: dict[str, Any] = {
-        "unit": unit,
-        "quantity": quantity or quantity_of_unit(unit),
-        "full_scale": full_scale,
-        "limits": limits,
-        "flags": tuple(flags),
-    }
-    factor = 1.0 if scale is None else scale
-    if dataset.ndim == 1:
-        channels.append(LogChannel(name, raster, **common))
-        sources.append(Source(name, n_samples, 0, None, factor, offset))
-        return
-    for column in range(dataset.shape[1 - axis]):
-        channels.append(LogChannel(f"{name}[{column + 1}]", raster, **common))
-        sources.append(Source(name, n_samples, axis, column, factor, offset))
-
-
-def _time_axis(dataset: Any, own: Attributes, flags: list[str]) -> int:
-    if dataset.ndim == 1:
-        return 0
-    said = own.number("time_axis")
-    if said in (0.0, 1.0):
-        return int(said)
-    if dataset.shape[0] == dataset.shape[1]:
-        flags.append("as many rows as columns: time is taken along the first axis")
-    return 0 if dataset.shape[0] >= dataset.shape[1] else 1
-
-
-def _full_scale(
-    dtype: np.dtype[Any], unit: str | None, scale: float | None, offset: float
-) -> tuple[float | None, tuple[float, float] | None]:
-    """Full scale where the values have no unit, and the limits of integers."""
-    if dtype.kind not in "iu":
-        return None, None
-    info = np.iinfo(dtype)
-    ends = sorted(float(end) * (1.0 if scale is None else scale) + offset for end in (info.min, info.max))
-    unscaled = unit is None and scale is None
-    return (2.0 ** (info.bits - 1) if unscaled else None), (ends[0], ends[1])

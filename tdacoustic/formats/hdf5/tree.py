@@ -12,7 +12,17 @@ import numpy as np
 from tdacoustic.formats.hdf5.attributes import Attributes
 from tdacoustic.formats.rates import snap_rate
 
-__all__ = ["MAX_COLUMNS", "TIME_NAMES", "Tree", "raster_of_time_vector", "read_tree", "reason_to_skip", "skipped_flags"]
+__all__ = [
+    "MAX_COLUMNS",
+    "NOT_RISING",
+    "TIME_NAMES",
+    "Tree",
+    "is_called_time",
+    "raster_of_time_vector",
+    "read_tree",
+    "reason_to_skip",
+    "skipped_flags",
+]
 
 MAX_COLUMNS = 1024
 MAX_OBJECTS = 100_000
@@ -30,6 +40,7 @@ NAMES_IN_A_FLAG = 5
 TIME_NAMES = frozenset({"time", "t", "times", "time_s", "t_s", "zeit", "temps", "timestamps", "time_axis"})
 SECONDS = {"s": 1.0, "sec": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6}
 PROBES = 64
+NOT_RISING = "is called a time but does not rise, or is not finite: it gives no sampling rate"
 
 
 @dataclass(frozen=True)
@@ -114,7 +125,7 @@ def reason_to_skip(dataset: Any) -> str | None:
         return "are virtual: their data lie in other files"
     if dataset.external:
         return "have their data in other files"
-    if dataset.dtype.kind not in "iuf" or dataset.dtype.metadata:
+    if dataset.dtype.kind not in "iufb" or dataset.dtype.metadata:
         return "are not numeric"
     if dataset.shape is None or dataset.ndim == 0:
         return "are single values"
@@ -147,21 +158,28 @@ def _reason_of_packing(dataset: Any) -> str | None:
     return None
 
 
+def is_called_time(name: str, dataset: Any) -> bool:
+    """Whether a dataset has the name of a time and is not in another unit; a capital T alone is a temperature."""
+    own = name.rpartition("/")[2]
+    return own.lower() in TIME_NAMES and own != "T" and dataset.dtype.kind == "f" and _seconds(dataset) is not None
+
+
+def _seconds(dataset: Any) -> float | None:
+    """Seconds of the unit, None where it is no time."""
+    return SECONDS.get((Attributes(dataset).text("unit", "units", "wf_yunit") or "s").lower())
+
+
 def raster_of_time_vector(name: str, dataset: Any) -> tuple[float, float, float | None] | str | None:
-    """Rate, start and raw rate that a time vector gives.
+    """Rate, start and raw rate that a vector gives which `is_called_time`.
 
     Only its ends and `PROBES` places between them are read.
 
     Returns
     -------
     (float, float, float or None), str or None
-        A sentence where it is called a time but is not equidistant; None where it is no time vector.
+        A sentence where it is not equidistant; None where it does not rise, or is not finite.
     """
-    if name.rpartition("/")[2].lower() not in TIME_NAMES or dataset.dtype.kind != "f":
-        return None
-    factor = SECONDS.get((Attributes(dataset).text("unit", "units", "wf_yunit") or "s").lower())
-    if factor is None:
-        return None
+    factor = _seconds(dataset) or 1.0
     n_samples = len(dataset)
     at = np.unique(np.linspace(0, n_samples - 1, min(PROBES, n_samples)).round().astype(np.int64))
     ends = np.arange(min(PROBES, n_samples))
@@ -174,6 +192,8 @@ def raster_of_time_vector(name: str, dataset: Any) -> tuple[float, float, float 
     neighbours = np.diff(at) == 1
     jump = np.abs(np.diff(probes)[neighbours] - step)
     if deviation.max() > 0.5 * step or (jump.size and jump.max() > 0.5 * step):
+        if name.rpartition("/")[2].lower() == "temps" and np.diff(probes).min() < 0.0:
+            return None  # not the French time, but temperatures
         return f"{name!r} is called a time but is not equidistant: it gives no sampling rate"
     rounding = float(np.finfo(dataset.dtype).eps) * float(np.abs(probes).max()) / (probes[-1] - probes[0])
     rate, raw = snap_rate(1.0 / (step * factor), rounding)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tdacoustic.formats.blocks import unique_names
+from tdacoustic.formats.integers import LOGICAL, full_scale_of
 from tdacoustic.formats.matlab.layouts import Described, pulse_channels, testlab_signal
 from tdacoustic.formats.matlab.sampling import TimeVectors, plain, rises_evenly
 from tdacoustic.formats.matlab.workspace import Array, Struct, Workspace
@@ -109,11 +110,13 @@ def _parts(described: Described) -> Iterator[tuple[str, LogChannel, Chosen]]:
     full_scale: float | None = None
     limits: tuple[float, float] | None = None
     if array.logical:
-        flags.append("logical values: 0 and 1")
+        flags.append(LOGICAL)
     elif array.dtype.kind in "iu":
         info = np.iinfo(array.dtype)
         limits = (float(info.min) * described.scale, float(info.max) * described.scale)
-        full_scale = 2.0 ** (info.bits - 1) if described.unit is None else None
+        if described.unit is None:
+            full_scale, notes = full_scale_of(info.min, info.max)
+            flags.extend(notes)
         if info.bits == 64:
             flags.append(f"integers of 64 bits: those beyond {EXACT} are rounded")
     channel = LogChannel("", raster, described.unit, quantity_of_unit(described.unit), full_scale, limits, tuple(flags))

@@ -21,9 +21,9 @@ import re
 from dataclasses import dataclass
 
 from tdacoustic.errors import UnitError
-from tdacoustic.formats.matlab.sampling import HIGHEST_HZ, LOWEST_HZ, SAME, Sampling, number_in
+from tdacoustic.formats.matlab.sampling import HIGHEST_HZ, LOWEST_HZ, SAME, Sampling
 from tdacoustic.formats.matlab.workspace import Array, Struct
-from tdacoustic.formats.rates import snap_rate
+from tdacoustic.formats.rates import number_in, snap_rate, thousands_doubt
 from tdacoustic.units import parse_unit
 
 __all__ = ["Described", "pulse_channels", "testlab_signal"]
@@ -153,8 +153,11 @@ def pulse_channels(root: Struct) -> tuple[list[Described], list[str]]:
     if claimed is not None and claimed != len(numbered):
         flags.append(f"'File_Header.NumberOfChannels' says {claimed:.9g}, {len(numbered)} channels are there")
     rate = _number(header, "SampleFrequency")
+    doubt = thousands_doubt(header.text("SampleFrequency") or "")
     sampling = Sampling(flags=("'File_Header.SampleFrequency' is not there, or no number",))
-    if rate is not None and LOWEST_HZ <= rate <= HIGHEST_HZ:
+    if doubt is not None:
+        sampling = Sampling(flags=(f"'File_Header.SampleFrequency': {doubt}",))
+    elif rate is not None and LOWEST_HZ <= rate <= HIGHEST_HZ:
         sampling = Sampling(*snap_rate(rate), 0.0, "'File_Header.SampleFrequency'")
     elif rate is not None:
         sampling = Sampling(flags=(f"'File_Header.SampleFrequency' is {rate:.9g}: no sampling rate is taken from it",))

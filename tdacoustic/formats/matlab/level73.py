@@ -139,7 +139,13 @@ class _Walk:
 
         owner.arrays.append(
             Array(
-                own, (int(shape[0]), int(shape[1])), dtype, kind == "logical", name, sample, attributes.storage_flags()
+                own,
+                (int(shape[0]), int(shape[1])),
+                dtype,
+                kind == "logical" or dtype.kind == "b",
+                name,
+                sample,
+                attributes.storage_flags(),
             )
         )
 

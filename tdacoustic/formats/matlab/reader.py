@@ -18,7 +18,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.bounds import clean_text
 from tdacoustic.formats.matlab import level4, level5
 from tdacoustic.formats.matlab.channels import channels_of
 from tdacoustic.formats.matlab.values import MatReader, Source
@@ -29,7 +28,6 @@ from tdacoustic.recording.log import Reader
 __all__ = ["scan_file", "scan_hdf5_here"]
 
 HEAD_BYTES = 520
-MAX_REASONS = 1000
 HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 
 
@@ -89,5 +87,5 @@ def _log(path: Path, workspace: Workspace, channels: tuple[LogChannel, ...], rea
     flags = workspace.all_flags()
     if not channels:
         reasons = "; ".join(flags) or "no variable of at least two numbers is in it"
-        raise FormatError(f"{path}: no array that could be a channel: {clean_text(reasons, MAX_REASONS)}")
+        raise FormatError(f"{path}: no array that could be a channel: {reasons}")
     return Log(path, "matlab", channels, reader, flags=flags, metadata=workspace.header_fields())

@@ -16,16 +16,16 @@ import numpy as np
 from tdacoustic.formats.hdf5.attributes import INTERVAL_NAMES, RATE_NAMES
 from tdacoustic.formats.hdf5.tree import TIME_NAMES, raster_of_time_vector
 from tdacoustic.formats.matlab.workspace import Array, Struct
-from tdacoustic.formats.rates import snap_rate
+from tdacoustic.formats.rates import number_in, snap_rate, thousands_doubt
 
-__all__ = ["Sampling", "TimeVectors", "number_in", "plain", "rises_evenly"]
+__all__ = ["Sampling", "TimeVectors", "plain", "rises_evenly"]
 
 RATES = RATE_NAMES | frozenset(
     {"sr", "fsamp", "fsample", "fsampling", "sampfreq", "samprate", "samplespersecond", "sps"}
 )
-INTERVALS = INTERVAL_NAMES | frozenset(
-    {"ts", "increment", "xincrement", "xinc", "tinc", "tsample", "sampletime", "sampleperiod", "samplingperiod"}
-)
+INTERVALS = INTERVAL_NAMES | frozenset({"xinc", "tinc", "tsample", "sampletime"})
+SAMPLE_TIME = "Ts"
+"""MATLAB's own name of an interval; in any other spelling (``t_s``) the letters are a time in seconds."""
 AXES = frozenset({"x", "xvalues", "xaxis", "xdata", "timeaxis", "abscissa"})
 """Structures that describe the axis of an array beside them."""
 
@@ -37,30 +37,10 @@ FIRST = 8
 DATE_NUMBERS = (693_962.0, 767_376.0)
 """MATLAB's day numbers of the years 1900 and 2101."""
 
-LATEST_START_S = 3.2e7
-"""A time vector that begins later than a year after zero begins at a date, not at an instant of the log [assumed]."""
-
 
 def plain(name: str) -> str:
     """A name without case and without anything but letters and digits."""
     return "".join(character for character in name.lower() if character.isalnum())
-
-
-def number_in(text: str) -> float | None:
-    """The number that a text is, be it with ``Hz`` behind it, with a decimal comma, or written several times.
-
-    Examples
-    --------
-    >>> number_in("65536"), number_in("1200,5 Hz"), number_in("8192 8192"), number_in("8192 4096"), number_in("fast")
-    (65536.0, 1200.5, 8192.0, None, None)
-    """
-    numbers = set()
-    for word in text.strip().removesuffix("Hz").split():
-        try:
-            numbers.add(float(word.replace(",", ".")))
-        except ValueError:
-            return None
-    return numbers.pop() if len(numbers) == 1 else None
 
 
 @dataclass(frozen=True)
@@ -157,11 +137,7 @@ class TimeVectors:
             said = ", ".join(f"{source} says {rate:.9g} Hz" for rate, source in numbers)
             odd.append(f"{said}: none is taken, no sampling rate is known")
             return Sampling(flags=tuple(odd))
-        start_s = 0.0
-        if time is not None and abs(time.start_s) <= LATEST_START_S:
-            start_s = time.start_s
-        elif time is not None:
-            odd.append(f"{time.path!r} begins at {time.start_s:.9g} s: taken for a date, not for an instant of the log")
+        start_s = 0.0 if time is None else time.start_s
         if time is not None and len(rates) == 1 and time.rate_hz is not None:
             return Sampling(time.rate_hz, time.raw_hz, start_s, numbers[0][1], tuple(odd))
         rate, raw = snap_rate(rates[0])
@@ -202,18 +178,25 @@ def _upwards(struct: Struct | None) -> Iterator[Struct]:
         struct = struct.parent
 
 
+def _says_rate(name: str) -> bool:
+    """Whether a number of that name is a sampling rate or interval."""
+    return plain(name) in RATES | INTERVALS or name == SAMPLE_TIME
+
+
 def _nearest_numbers(owner: Struct) -> tuple[list[tuple[float, str]], list[str]]:
     """Rates that numbers of the nearest structure give, and what is odd about them."""
     odd: list[str] = []
     for struct in _upwards(owner):
         found: list[tuple[float, str]] = []
         for place in (struct, *(below for below in struct.structs if plain(below.name) in AXES)):
-            named = [*place.numbers, *((name, number_in(text)) for name, text in place.texts)]
-            for name, number in named:
-                kind = plain(name)
-                if number is None or kind not in RATES | INTERVALS:
+            for name, text in place.texts:
+                if _says_rate(name) and (doubt := thousands_doubt(text)) is not None:
+                    odd.append(f"{place.path(name)!r}: {doubt}")
+            texts = [(name, number_in(text)) for name, text in place.texts if thousands_doubt(text) is None]
+            for name, number in [*place.numbers, *texts]:
+                if number is None or not _says_rate(name):
                     continue
-                rate = number if kind in RATES else 1.0 / number if number > 0.0 else 0.0
+                rate = number if plain(name) in RATES else 1.0 / number if number > 0.0 else 0.0
                 if LOWEST_HZ <= rate <= HIGHEST_HZ:
                     found.append((rate, f"{place.path(name)!r}"))
                 else:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.blocks import check_request, rebuffered
+from tdacoustic.formats.blocks import by_origin, check_request, in_asked_order
 from tdacoustic.formats.matlab.storage import Place, storage_of
 
 __all__ = ["MatReader", "Source", "Values"]
@@ -96,25 +96,16 @@ class MatReader:
         """
         chosen = [self.sources[column] for column in columns]
         check_request(self.path, min((source.n_samples for source in chosen), default=0), start, stop, block_size)
-        rows: dict[tuple[Values, int], list[int]] = {}
-        for row, source in enumerate(chosen):
-            rows.setdefault((source.values, source.time_axis), []).append(row)
+        rows = by_origin((source.values, source.time_axis) for source in chosen)
         if start == stop or not chosen:
             return
         try:
             with self.path.open("rb") as stream:
-                parts = [
-                    rebuffered(
-                        self._slabs(stream, [chosen[row] for row in members], start, stop, len(chosen)), block_size
-                    )
+                slabs = [
+                    self._slabs(stream, [chosen[row] for row in members], start, stop, len(chosen))
                     for members in rows.values()
                 ]
-                if len(parts) == 1:
-                    yield from parts[0]
-                    return
-                order = np.argsort([row for members in rows.values() for row in members])
-                for pieces in zip(*parts, strict=True):
-                    yield np.concatenate(pieces)[order]
+                yield from in_asked_order(slabs, rows.values(), block_size)
         except OSError as error:
             raise FormatError(f"{self.path}: cannot be read ({error.strerror})") from error
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from tdacoustic.formats.integers import full_scale_of
 from tdacoustic.formats.mdf4.conversions import Conversion
 from tdacoustic.formats.mdf4.groups import Channel
 
@@ -92,18 +93,20 @@ class Field:
         line = self.conversion.line
         if self.kind == "f" or line is None:
             return None
-        low, high = (0, 2**self.bit_count - 1) if self.kind == "u" else _signed(self.bit_count)
-        one, other = (end * line[0] + line[1] for end in (low, high))
+        one, other = (end * line[0] + line[1] for end in _ends(self.kind, self.bit_count))
         return min(one, other), max(one, other)
 
     @property
-    def full_scale(self) -> float | None:
-        """The number that means full scale, where nothing says what the numbers mean."""
-        return 2.0 ** (self.bit_count - 1) if self.kind != "f" and self.conversion.kind == 0 else None
+    def full_scale(self) -> tuple[float | None, tuple[str, ...]]:
+        """The number that means full scale, where nothing says what the numbers mean, and what is doubtful about it."""
+        if self.kind == "f" or self.conversion.kind != 0:
+            return None, ()
+        return full_scale_of(*_ends(self.kind, self.bit_count))
 
 
-def _signed(bits: int) -> tuple[int, int]:
-    return -(2 ** (bits - 1)), 2 ** (bits - 1) - 1
+def _ends(kind: str, bits: int) -> tuple[int, int]:
+    """Smallest and largest integer."""
+    return (0, 2**bits - 1) if kind == "u" else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
 
 def field_of(channel: Channel) -> Field:

@@ -208,14 +208,15 @@ def _invalid_flag(walk: Walk, records: Records, own: Field) -> tuple[str, ...]:
 
 def _channel(channel: Channel, own: Field, raster: Raster, flags: tuple[str, ...]) -> LogChannel:
     unit = channel.unit
+    full_scale, notes = own.full_scale if unit is None else (None, ())
     return LogChannel(
         channel.name,
         raster,
         unit=unit,
         quantity=quantity_of_unit(unit),
-        full_scale=own.full_scale if unit is None else None,
+        full_scale=full_scale,
         limits=own.limits,
-        flags=flags,
+        flags=(*flags, *notes),
     )
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.blocks import check_request, rebuffered, spans
+from tdacoustic.formats.blocks import by_origin, check_request, in_asked_order, spans
 from tdacoustic.formats.mdf4.clocks import Clock
 from tdacoustic.formats.mdf4.fields import Field
 from tdacoustic.formats.mdf4.header import read_header
@@ -102,24 +102,14 @@ class Mdf4Reader:
         chosen = [self.sources[column] for column in columns]
         n_samples = min((self.groups[source.group].records.n_records for source in chosen), default=0)
         check_request(self.path, n_samples, start, stop, block_size)
-        rows: dict[int, list[int]] = {}
-        for row, source in enumerate(chosen):
-            rows.setdefault(source.group, []).append(row)
+        rows = by_origin(source.group for source in chosen)
         keeps = sum(self.groups[group].records.longest_packed for group in rows) <= MAX_KEPT
         with _opened(self.path) as stream:
-            parts = [
-                rebuffered(
-                    self._slabs(stream, group, [chosen[row].field for row in members], start, stop, len(rows), keeps),
-                    block_size,
-                )
+            slabs = [
+                self._slabs(stream, group, [chosen[row].field for row in members], start, stop, len(rows), keeps)
                 for group, members in rows.items()
             ]
-            if len(parts) == 1:
-                yield from parts[0]
-                return
-            order = np.argsort([row for members in rows.values() for row in members])
-            for pieces in zip(*parts, strict=True):
-                yield np.concatenate(pieces)[order]
+            yield from in_asked_order(slabs, rows.values(), block_size)
 
     def _slabs(
         self,

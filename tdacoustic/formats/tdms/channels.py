@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
 from tdacoustic.formats.blocks import unique_names
+from tdacoustic.formats.integers import LOGICAL, full_scale_of
 from tdacoustic.formats.tdms.metadata import TYPES
 from tdacoustic.formats.tdms.paths import path_of, shown, split_path
 from tdacoustic.formats.tdms.scalings import Scaling, ScalingError, limits_of, read_scaling
@@ -333,16 +334,20 @@ def _channel(item: Found, name: str, name_flag: str | None, begin: int | None) -
         start_s = timing.offset_s
         if begin is not None:
             flags.append("it states no start time and others do: it is taken to start with the first of them")
-    is_integer = item.dtype[-2] in "iu"
-    unscaled = item.scaling is None and item.unit is None
+    is_integer, is_logical = item.dtype[-2] in "iu", item.dtype[-1] == "?"
+    unit = None if is_logical and item.scaling is None else item.unit
     full_scale = None
-    if is_integer and unscaled:
-        full_scale = 1.0 if item.is_bit else 2.0 ** (8 * int(item.dtype[-1]) - 1)
+    if is_logical:
+        flags.append(LOGICAL)
+    elif is_integer and item.scaling is None and unit is None:
+        info = np.iinfo(item.dtype)
+        full_scale, notes = (1.0, ()) if item.is_bit else full_scale_of(info.min, info.max)
+        flags.extend(notes)
     return LogChannel(
         name,
         Raster(timing.rate_hz, item.n_values, start_s, timing.raw_hz),
-        unit=item.unit,
-        quantity=quantity_of_unit(item.unit),
+        unit=unit,
+        quantity=quantity_of_unit(unit),
         full_scale=full_scale,
         limits=limits_of(item.scaling, item.dtype) if is_integer and not item.is_bit else None,
         flags=tuple(flags),

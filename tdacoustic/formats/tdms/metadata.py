@@ -54,14 +54,15 @@ TYPES: Final[dict[int, tuple[str, int | None, str | None]]] = {
     0x1A: ("double-precision numbers", 8, "f8"),
     0x1B: ("extended-precision numbers", None, None),
     0x20: ("text", None, None),
-    0x21: ("true or false", 1, None),
+    0x21: ("true or false", 1, "?"),
     0x44: ("instants", 16, None),
     0x4F: ("fixed-point numbers", None, None),
     0x08000C: ("complex numbers", 8, None),
     0x10000D: ("complex numbers", 16, None),
     DAQMX_RAW: ("DAQmx raw data", 0, None),
 }
-"""Type code -> words, bytes a value (None where the code does not fix them), numpy type where it is a real number."""
+"""Type code -> words, bytes a value (None where the code does not fix them), numpy type of real numbers and of true
+and false."""
 
 TEXT = 0x20
 SCALER_TYPES: Final = dict(enumerate(("u1", "i1", "u2", "i2", "u4", "i4", "u8", "i8", "f4", "f8")))

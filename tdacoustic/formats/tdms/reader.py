@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tdacoustic.errors import FormatError
-from tdacoustic.formats.blocks import check_request, rebuffered
+from tdacoustic.formats.blocks import by_origin, check_request, in_asked_order
 from tdacoustic.formats.tdms.channels import (
     Found,
     Inventory,
@@ -71,9 +71,7 @@ class TdmsReader:
         chosen = [self.channels[column] for column in columns]
         shortest = min((self.tracks[place[0]].n_values for place, _ in chosen), default=0)
         check_request(self.path, shortest, start, stop, block_size)
-        rows: dict[int, list[int]] = {}
-        for row, (place, _) in enumerate(chosen):
-            rows.setdefault(place[0], []).append(row)
+        rows = by_origin(place[0] for place, _ in chosen)
         try:
             with self.path.open("rb", buffering=0) as stream:
                 size = stream.seek(0, 2)
@@ -81,17 +79,11 @@ class TdmsReader:
                     raise FormatError(
                         f"{self.path}: the file has {size} bytes, and had {self.size} when it was scanned"
                     )
-                parts = []
+                pieces = []
                 for track, members in rows.items():
                     wanted = [(chosen[row][0][1], chosen[row][1]) for row in members]
-                    pieces = self.tracks[track].pieces(self.path, stream, wanted, start, stop)
-                    parts.append(rebuffered(pieces, block_size))
-                if len(parts) == 1:
-                    yield from parts[0]
-                    return
-                order = np.argsort([row for members in rows.values() for row in members])
-                for blocks in zip(*parts, strict=True):
-                    yield np.concatenate(blocks)[order]
+                    pieces.append(self.tracks[track].pieces(self.path, stream, wanted, start, stop))
+                yield from in_asked_order(pieces, rows.values(), block_size)
         except OSError as error:
             raise FormatError(f"{self.path}: cannot be read ({error.strerror})") from error
 
@@ -126,7 +118,7 @@ def scan_file(path: Path) -> Log:
     channels, start_time, date_flags = log_channels(inventory.found)
     flags = (*left_out_flags(inventory), *structure.flags, *date_flags)
     if not channels:
-        raise FormatError(f"{path}: no channel of real numbers ({'; '.join(flags) or 'nothing in it'})"[:1500])
+        raise FormatError(f"{path}: no channel of real numbers ({'; '.join(flags) or 'nothing in it'})")
     members = tuple(
         (item.place, Member(channel.name, item.scaling))
         for item, channel in zip(inventory.found, channels, strict=True)

@@ -69,6 +69,7 @@ def _sentence(run: RunClocks) -> str:
     parts = [
         f"{clock.log} starts at {clock.offset_s:.6f} s and its clock runs {abs(clock.drift_ppm or 0.0):.3g} ppm "
         f"{'fast' if (clock.drift_ppm or 0.0) > 0.0 else 'slow'}"
+        f"{' (its shared channel has the sign turned round)' if clock.estimate and clock.estimate.inverted else ''}"
         for clock in run.clocks
     ]
     errors = [_axis_error(clock) for clock in run.clocks]

@@ -9,7 +9,7 @@ from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph
 from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit
 from tdacoustic.results import Analysis
 from tdacoustic.sensors import LIMIT_DB
-from tdacoustic.sensors.checking import ChannelCalibration
+from tdacoustic.sensors.channel_calibration import ChannelCalibration
 
 __all__ = ["doubtful_channels", "sensors"]
 
