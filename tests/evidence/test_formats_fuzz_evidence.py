@@ -31,7 +31,7 @@ def test_the_record_is_well_formed(study, found):
             "endings", "sources_sha256",
         }, name  # fmt: skip
         assert row["executions"] > 1000 and row["coverage"] > 50 and row["corpus"] >= row["seeds"] - 1, name
-        peak_mb = study.MOST_MB + 100 if row["endings"] else 1024  # what ended a run had all that it was let have
+        peak_mb = study.MOST_MB + 100 if row["endings"] else 400  # what ended a run had all that it was let have
         assert row["peak_rss_mb"] < peak_mb and row["slowest_unit_s"] <= study.MOST_S, name
     for row in found["fixed"]:
         assert set(row) == {"format", "defect", "mended"}
