@@ -19,8 +19,7 @@ if TYPE_CHECKING:
     from tdacoustic.measured.calibrator_step import CalibratorReadings
     from tdacoustic.recording import Channel, Log, LogChannel
     from tdacoustic.sensors.checking import CalibratorCheck, CalibratorRun, ChannelCalibration, ChannelScale
-    from tdacoustic.steps import Record, Store, Task
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store, Task
 
 __all__ = ["campaign_sensors"]
 
@@ -62,7 +61,7 @@ Scales = Mapping[str, Mapping[str, "KnownScale"]]
 
 
 def campaign_sensors(
-    campaign: Campaign, store: Store, n_jobs: int | None = None, progress: Progress | None = None
+    campaign: Campaign, store: Store, n_jobs: Jobs | None = None, progress: Progress | None = None
 ) -> tuple[CampaignSensors, Mapping[str, Record]]:
     """Find out the scales that do not stand in the campaign, and check those that do.
 
@@ -70,7 +69,7 @@ def campaign_sensors(
     ----------
     campaign : Campaign
     store : Store
-    n_jobs : int, optional
+    n_jobs : int or Executor, optional
         Processes; default 1.
     progress : callable, optional
 
@@ -130,7 +129,7 @@ def _calibrator_run(run: CampaignRun, series: int) -> CalibratorRun:
 def _tasks(campaign: Campaign, scanned: Sequence[Scanned], store: Store) -> dict[str, Task]:
     """By calibrator run, the task that reads its tone in every channel that the calibrator may have been put on."""
     from tdacoustic.measured.calibrator_step import CALIBRATOR, CalibratorSettings
-    from tdacoustic.steps import log_file
+    from tdacoustic.workflows.fetched_logs import hashed_logs
 
     found = {}
     for item in scanned:
@@ -139,9 +138,10 @@ def _tasks(campaign: Campaign, scanned: Sequence[Scanned], store: Store) -> dict
         channels = tuple(_candidates(campaign, item))
         wanted = _calibrator_run(item.run, 1).wanted_hz or tuple(sorted({*sum(USUAL_FREQUENCIES_HZ.values(), ())}))
         if channels:
-            logs = tuple(log_file(log.path, store, log.companions) for log in item.logs)
             settings = CalibratorSettings(channels, wanted)
-            found[item.run.name] = CALIBRATOR.task(f"run {item.run.name}", settings, logs=logs)
+            found[item.run.name] = CALIBRATOR.task(
+                f"run {item.run.name}", settings, logs=hashed_logs(item.run, item.logs, store)
+            )
     return found
 
 
@@ -181,7 +181,7 @@ def _quantity(channel: CampaignChannel, source: LogChannel) -> str | None:
     return channel.scale.stated_quantity() or source.quantity or quantity_of_unit(source.unit)
 
 
-Execution = tuple[int, "Progress | None"]
+Execution = tuple["Jobs", "Progress | None"]
 
 
 def _checks(

@@ -15,12 +15,12 @@ from tdacoustic.measured.clock_step import CLOCK, ClockFinding, ClockSettings, S
 from tdacoustic.measured.run_clocks import LogClock, RunClocks
 from tdacoustic.quality import Verdict
 from tdacoustic.recording import Log
-from tdacoustic.steps import Store, Task, execute, lineage, log_file, result_of
+from tdacoustic.steps import Store, Task, execute, lineage, result_of
+from tdacoustic.workflows.fetched_logs import hashed_logs
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign, CampaignRun
-    from tdacoustic.steps import Record
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record
 
 __all__ = ["campaign_clocks"]
 
@@ -63,7 +63,7 @@ class _Several:
 
 
 def campaign_clocks(
-    campaign: Campaign, store: Store, n_jobs: int | None, progress: Progress | None
+    campaign: Campaign, store: Store, n_jobs: Jobs | None, progress: Progress | None
 ) -> tuple[dict[str, RunClocks], dict[str, TdacousticError], dict[str, Record]]:
     """Return the clocks of each run of several logs, why some cannot be had, and the records of the steps.
 
@@ -71,7 +71,7 @@ def campaign_clocks(
     ----------
     campaign : Campaign
     store : Store
-    n_jobs : int or None
+    n_jobs : int or Executor or None
     progress : callable or None
     """
     clocks: dict[str, RunClocks] = {}
@@ -194,8 +194,9 @@ def _tasks(campaign: Campaign, several: _Several, store: Store) -> dict[int, Tas
         settings = ClockSettings(
             columns[reference], columns[index], run.max_offset_s, centre_s if run.max_offset_s is not None else 0.0
         )
-        files = [log_file(several.logs[i].path, store, several.logs[i].companions) for i in (reference, index)]
-        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=tuple(files))
+        logs = hashed_logs(run, several.logs, store)
+        pair = (logs[reference], logs[index])
+        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=pair)
     return found
 
 

@@ -6,7 +6,7 @@ Each part reads samples, so each is a step: results are kept, and a campaign tha
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tdacoustic.errors import TdacousticError
@@ -15,8 +15,7 @@ from tdacoustic.measured.run_sensors import CampaignSensors
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
-    from tdacoustic.steps import Record, Store
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store
 
 __all__ = ["Groundwork", "lay_groundwork"]
 
@@ -42,9 +41,13 @@ class Groundwork:
     records: Mapping[str, Record] = field(default_factory=dict)
     sensors: CampaignSensors = field(default_factory=CampaignSensors)
 
+    def with_failed(self, failed: Mapping[str, TdacousticError]) -> Groundwork:
+        """Return it with further runs that cannot be used."""
+        return replace(self, failed={**self.failed, **failed})
+
 
 def lay_groundwork(
-    campaign: Campaign, store: Store, n_jobs: int | None = None, progress: Progress | None = None
+    campaign: Campaign, store: Store, n_jobs: Jobs | None = None, progress: Progress | None = None
 ) -> Groundwork:
     """Find out what binding the campaign's channels rests on.
 
@@ -52,7 +55,7 @@ def lay_groundwork(
     ----------
     campaign : Campaign
     store : Store
-    n_jobs : int, optional
+    n_jobs : int or Executor, optional
         Processes; default 1.
     progress : callable, optional
 

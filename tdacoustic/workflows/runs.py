@@ -18,6 +18,7 @@ from tdacoustic.quality import Verdict
 from tdacoustic.recording import Channel, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+from tdacoustic.workflows.fetched_logs import hashed_logs
 from tdacoustic.workflows.groundwork import Groundwork, lay_groundwork
 from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
 
@@ -123,13 +124,13 @@ def _prepare(
 ) -> PreparedRun:
     """Scan and hash a run's logs, bind its channels, make its task."""
     try:
-        scanned = tuple(scan(log.path) for log in run.logs)
         if run.name in ground.failed:
             raise ground.failed[run.name]
+        scanned = tuple(scan(log.path) for log in run.logs)
         clocks = ground.clocks.get(run.name)
         axes = None if clocks is None else clocks.axes
         bound = bind_run(campaign.channels, run, scanned, ground.sensors.of_run(run.name), axes)
-        logs = tuple(log_file(log.path, store, log.companions) for log in scanned)
+        logs = hashed_logs(run, scanned, store)
     except TdacousticError as error:
         return PreparedRun(run, error=error)
     analysis = campaign.analysis
