@@ -8,7 +8,8 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +22,11 @@ from tdacoustic.errors import TdacousticError
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign as LoadedCampaign
     from tdacoustic.results import Analysis
+    from tdacoustic.steps import Cluster
+    from tdacoustic.steps import Jobs as StepJobs
+    from tdacoustic.workflows.campaign_list import ListedCampaign
     from tdacoustic.workflows.output import OutputFolder
+    from tdacoustic.workflows.run_many import ManyRuns
 
 __all__ = ["app", "main"]
 
@@ -35,9 +40,24 @@ app = typer.Typer(
 )
 
 Campaign = Annotated[Path, typer.Argument(help="campaign.toml, or the folder it is in.", show_default=False)]
+Campaigns = Annotated[
+    list[Path] | None,
+    typer.Argument(
+        metavar="CAMPAIGN...", help="campaign.toml, or the folder it is in; a glob of either.", show_default=False
+    ),
+]
 Logs = Annotated[list[Path], typer.Argument(help="Logs: WAV, FLAC, HDF5, CSV, UFF 58.", show_default=False)]
 Out = Annotated[
     Path | None, typer.Option("-o", "--out", help="Output folder.", show_default="reports/<folder of the campaign>")
+]
+ManyOut = Annotated[
+    Path | None,
+    typer.Option(
+        "-o",
+        "--out",
+        help="Output folder; of several campaigns, the folder of theirs.",
+        show_default="reports/<folder of the campaign>",
+    ),
 ]
 Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write over whatever is in the output folder.")]
 StorePath = Annotated[
@@ -49,6 +69,16 @@ StorePath = Annotated[
 Jobs = Annotated[
     int | None, typer.Option("--jobs", min=1, help="Processes.", show_default="one a core for large logs and housings")
 ]
+Scheduler = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="Compute on the workers of this dask.distributed scheduler, as tcp://host:8786; trust it.",
+        show_default=False,
+    ),
+]
+FetchUrls = Annotated[bool, typer.Option("--fetch-urls", help="Fetch logs that a campaign names by URL.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone.")]
 
 
@@ -82,13 +112,37 @@ def _progress(quiet: bool) -> Iterator[Callable[[str, float, int], None] | None]
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)
 
 
+def _cluster(scheduler: str | None, quiet: bool) -> Cluster | None:
+    """The cluster that a scheduler stands for; one that cannot be used is said before anything is computed."""
+    if scheduler is None:
+        return None
+    from tdacoustic.steps import Cluster
+
+    cluster = Cluster(scheduler)
+    _warn(cluster.doubts, quiet)
+    return cluster
+
+
+def _executor(jobs: int | None, scheduler: str | None, quiet: bool) -> StepJobs | None:
+    """Where steps are computed, as options say it."""
+    if jobs is not None and scheduler is not None:
+        raise typer.BadParameter("--jobs is of this machine, --scheduler names other ones; leave one out")
+    return jobs if scheduler is None else _cluster(scheduler, quiet)
+
+
 def _analysed(
-    campaign: Path | LoadedCampaign, store: Path | None, jobs: int | None, quiet: bool, *, deeper: bool = True
+    campaign: Path | LoadedCampaign,
+    store: Path | None,
+    jobs: StepJobs | None,
+    quiet: bool,
+    fetch_urls: bool,
+    *,
+    deeper: bool = True,
 ) -> Analysis:
     from tdacoustic.workflows.analyze import analyze
 
     with _progress(quiet) as progress:
-        return analyze(campaign, store, jobs, progress, deeper=deeper)
+        return analyze(campaign, store, jobs, progress, deeper=deeper, fetch_urls=fetch_urls)
 
 
 def _toml(campaign: Path) -> Path:
@@ -159,6 +213,8 @@ def check(
     overwrite: Overwrite = False,
     store: StorePath = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fetch_urls: FetchUrls = False,
     quiet: Quiet = False,
 ) -> None:
     """Check the recordings of a campaign; exit 1 if a run cannot be used."""
@@ -166,7 +222,7 @@ def check(
     from tdacoustic.workflows.output import default_output
     from tdacoustic.workflows.write import write_check
 
-    analysis = _analysed(campaign, store, jobs, quiet, deeper=False)
+    analysis = _analysed(campaign, store, _executor(jobs, scheduler, quiet), quiet, fetch_urls, deeper=False)
     write_check(analysis, out or default_output(_toml(campaign)), _toml(campaign), overwrite)
     table = analysis.tables["quality"]
     if not quiet:
@@ -189,13 +245,15 @@ def analyze(
     overwrite: Overwrite = False,
     store: StorePath = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fetch_urls: FetchUrls = False,
     quiet: Quiet = False,
 ) -> None:
     """Analyse the logs of a campaign: levels, spectra, lines."""
     from tdacoustic.workflows.write import write_analysis
 
     loaded, target, folder = _opened(campaign, out, overwrite)
-    analysis = _analysed(loaded, store, jobs, quiet)
+    analysis = _analysed(loaded, store, _executor(jobs, scheduler, quiet), quiet, fetch_urls)
     write_analysis(analysis, folder, "analyze")
     _warn(analysis.problems, quiet)
     if not quiet:
@@ -211,6 +269,7 @@ def predict(
     overwrite: Overwrite = False,
     store: StorePath = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise, the housing and its sound."""
@@ -222,8 +281,9 @@ def predict(
     loaded = load_fleet(fleet)  # a wrong fleet is said before anything else
     target = out or default_output(loaded.path)
     folder = OutputFolder(target, loaded.path, overwrite)
+    executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
-        result = compute(loaded, store, progress, jobs=jobs)
+        result = compute(loaded, store, progress, jobs=executor)
     write_prediction(result, folder)
     _warn(result.prediction.doubts, quiet)
     if not quiet:
@@ -237,6 +297,8 @@ def calibrate(
     overwrite: Overwrite = False,
     store: StorePath = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fetch_urls: FetchUrls = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit the model of a campaign's fleet to its measured levels."""
@@ -244,8 +306,9 @@ def calibrate(
     from tdacoustic.workflows.write import write_calibration
 
     loaded, target, folder = _opened(campaign, out, overwrite)
+    executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
-        result = compute(loaded, store, jobs, progress)
+        result = compute(loaded, store, executor, progress, fetch_urls=fetch_urls)
     write_calibration(result, folder)
     _warn(result.calibration.doubts, quiet)
     if not quiet:
@@ -254,27 +317,137 @@ def calibrate(
 
 @app.command()
 def run(
-    campaign: Campaign,
-    out: Out = None,
+    campaigns: Campaigns = None,
+    out: ManyOut = None,
     overwrite: Overwrite = False,
     store: StorePath = None,
     jobs: Jobs = None,
+    scheduler: Scheduler = None,
+    fetch_urls: FetchUrls = False,
     quiet: Quiet = False,
+    list_file: Annotated[
+        Path | None, typer.Option("--list", help="Campaigns too: a path or glob a line.", show_default=False)
+    ] = None,
+    again: Annotated[
+        bool, typer.Option("--again", help="Of several: assemble results that are up to date too.")
+    ] = False,
 ) -> None:
-    """Do all that can be done for a campaign and write one report: the main job."""
-    from tdacoustic.workflows.run import run as compute
+    """Do all that can be done for a campaign and write one report: the main job. Several go side by side."""
+    from tdacoustic.workflows.campaign_list import listed_campaigns
+
+    if not campaigns and list_file is None:
+        raise typer.BadParameter("name a campaign, or a --list of them")
+    listed = listed_campaigns(campaigns or (), list_file)
+    if len(listed) == 1 and list_file is None:
+        _run_one(listed[0].file, out, overwrite, store, jobs, quiet, scheduler, fetch_urls)
+    else:
+        _run_many(listed, out, overwrite, store, jobs, quiet, again, scheduler, fetch_urls)
+
+
+def _run_one(
+    campaign: Path,
+    out: Path | None,
+    overwrite: bool,
+    store: Path | None,
+    jobs: int | None,
+    quiet: bool,
+    scheduler: str | None,
+    fetch_urls: bool,
+) -> None:
+    from tdacoustic.workflows.run_one import run_into
     from tdacoustic.workflows.summary import run_lines
-    from tdacoustic.workflows.write import write_run
 
     loaded, target, folder = _opened(campaign, out, overwrite)
+    executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
-        result = compute(loaded, store, jobs, progress)
-    write_run(result, folder)
+        result = run_into(loaded, folder, store, executor, progress, fetch_urls=fetch_urls).result
     _warn((*result.problems, *result.doubts), quiet)
     if not quiet:
         for line in run_lines(result):
             print(line)
         print(target / "report.html")
+
+
+def _run_many(
+    listed: Sequence[ListedCampaign],
+    out: Path | None,
+    overwrite: bool,
+    store: Path | None,
+    jobs: int | None,
+    quiet: bool,
+    again: bool,
+    scheduler: str | None,
+    fetch_urls: bool,
+) -> None:
+    from tdacoustic.workflows.run_many import run_many
+
+    start = time.monotonic()
+    how: dict[str, Any] = {"overwrite": overwrite, "again": again, "fetch_urls": fetch_urls}
+    how["inner"] = _cluster(scheduler, quiet)
+    try:
+        with _progress(quiet) as progress:
+            done = run_many(listed, out or "reports", store, jobs, progress, **how)
+    except KeyboardInterrupt as stopped:
+        _say(f"stopped; {stopped}; run again to go on")
+        raise typer.Exit(1) from None
+    if not quiet:
+        _show_many(done, time.monotonic() - start)
+    for row in done.failed:
+        _say(f"error: {row.campaign}: {row.told.error}")
+    if done.failed:
+        raise typer.Exit(1)
+
+
+def _show_many(done: ManyRuns, took_s: float) -> None:
+    """Print what became of many campaigns: a table on a terminal, aligned lines in a pipe, and how they add up."""
+    from tdacoustic.workflows.run_many_table import plain_lines, rich_table
+
+    if sys.stdout.isatty():
+        from rich.console import Console
+
+        Console().print(rich_table(done.rows, _inert))
+    else:
+        print(_inert("\n".join(plain_lines(done.rows))))
+    if done.note is not None:
+        print(_inert(done.note))
+    print(_inert(done.in_words(took_s)))
+    print(_inert(str(done.table)))
+
+
+@app.command()
+def fleet(
+    folders: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="DIR...", help="Result folders, folders with such below, or patterns.", show_default=False
+        ),
+    ],
+    out: Annotated[Path, typer.Option("-o", "--out", help="Output folder.")] = Path("reports/fleet"),
+    overwrite: Overwrite = False,
+    train_key: Annotated[
+        str | None,
+        typer.Option("--train-key", help="Key of [meta] that says the train.", show_default="train, vehicle, ..."),
+    ] = None,
+    date_key: Annotated[
+        str | None, typer.Option("--date-key", help="Key of [meta] that says the date.", show_default="date, year")
+    ] = None,
+    check_all: Annotated[
+        bool, typer.Option("--check-all", help="Check every file of a result, its report and arrays too.")
+    ] = False,
+    quiet: Quiet = False,
+) -> None:
+    """Gather the results of many campaigns: one dataset, one page, and what stands out."""
+    from tdacoustic.workflows.fleet_view import fleet_view
+
+    with _progress(quiet) as progress:
+        found = fleet_view(folders, out, overwrite, train_key, date_key, check_all, progress)
+    left_out = [f"{each.folder} is left out: {each.reason}" for each in found.left_out]
+    shown = left_out[:20]
+    if len(left_out) > len(shown):
+        shown.append(f"{len(left_out) - len(shown)} more are left out: see {out / 'manifest.json'}")
+    _warn(shown, quiet)
+    if not quiet:
+        print(out / "report.html")
 
 
 @app.command()

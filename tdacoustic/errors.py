@@ -8,9 +8,12 @@ allowed and where it stands (file, channel, key).
 __all__ = [
     "AnalysisError",
     "CampaignError",
+    "ExecutorError",
+    "FetchError",
     "FittingError",
     "FleetError",
     "FormatError",
+    "GatheringError",
     "GearError",
     "MissingFileError",
     "MissingPackageError",
@@ -51,12 +54,24 @@ class CampaignError(TdacousticError, ValueError):
     """A campaign file is wrong: unknown key, bad value, or contradiction."""
 
 
+class ExecutorError(TdacousticError, RuntimeError):
+    """Nothing can be computed where it was asked to be: a cluster that is lost, workers that do not start."""
+
+
+class FetchError(TdacousticError, OSError):
+    """A log that is named by URL cannot be fetched."""
+
+
 class FittingError(TdacousticError, ValueError):
     """A calibration that cannot be set up, or has nothing to work on."""
 
 
 class FleetError(TdacousticError, ValueError):
     """A fleet file is wrong, or lacks a parameter that is needed."""
+
+
+class GatheringError(TdacousticError, ValueError):
+    """Results that cannot be gathered: damaged, incomplete, or none at all."""
 
 
 class GearError(TdacousticError, ValueError):

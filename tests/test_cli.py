@@ -441,7 +441,7 @@ def test_a_store_that_cannot_be_made(tda, tmp_path):
     [
         "run",
         "nonsense",
-        "run a b",
+        "analyze a b",
         "run a --nonsense",
         "run a --jobs 0",
         "run a --jobs x",

@@ -30,7 +30,7 @@ ALLOWED = {
     "railway": "spectra units errors",
     "quality": "lines spectra speed recording units errors",
     "contributions": "spectra recording errors",
-    "steps": "errors",
+    "steps": "errors __version__",
     "gears": "errors",
     "motor": "errors",
     "radiation": "units errors",
@@ -45,13 +45,14 @@ ALLOWED = {
     "results": "studies fitting drive attribution measured contributions railway campaign fleet spectra steps errors",
     "tables": "studies drive gears attribution measured contributions orders tones railway speed campaign fleet units "
     "sensors errors",
-    "reporting": "studies results tables fitting drive gears attribution measured contributions orders tones railway "
-    "campaign sensors fleet quality lines spectra speed recording units errors __version__",
+    "gathering": "tables errors",
+    "reporting": "gathering studies results tables fitting drive gears attribution measured contributions orders tones "
+    "railway campaign sensors fleet quality lines spectra speed recording units errors __version__",
     "synthesis": "errors",
-    "workflows": "studies reporting tables results fitting drive gears attribution measured contributions orders tones "
-    "railway steps quality lines spectra speed ingest campaign sensors fleet toml_models formats recording units "
-    "errors",
-    "cli": "workflows synthesis results campaign fleet errors __version__",
+    "workflows": "gathering studies reporting tables results fitting drive gears attribution measured contributions "
+    "orders tones railway steps quality lines spectra speed ingest campaign sensors fleet toml_models formats "
+    "recording units errors",
+    "cli": "workflows synthesis results campaign fleet steps errors __version__",
     "__main__": "cli",
     "__init__": "",
 }
@@ -81,7 +82,7 @@ CALLS_NOT_IN_THE_CORE = frozenset({"open", "print", "input"})
 
 HEAVY = frozenset(
     {"h5py", "librosa", "lmfit", "matplotlib", "ngsolve", "numba", "pandas", "plotly", "pyoctaveband", "pyuff"}
-    | {"asammdf", "defusedxml", "dwdatareader", "nptdms", "scipy", "soundfile"}
+    | {"aiohttp", "asammdf", "dask", "defusedxml", "distributed", "dwdatareader", "nptdms", "pyarrow", "scipy", "soundfile"}
 )
 
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from tdacoustic.campaign.railway import RailwayTest, passage_problem
-from tdacoustic.campaign.values import StatedPath
+from tdacoustic.campaign.values import StatedLog
 from tdacoustic.sensors import parse_calibrator
 from tdacoustic.toml_models import Name, NonNegative, Positive, Table, Text, each_once
 
@@ -70,7 +70,7 @@ class CampaignRun(Table):
         Of a run-up or a coast-down whose speed no channel says: the speed at its start, from which on it is sought in
         the lines of vibration. At most one of both.
     logs : tuple of WrittenPath
-        At least one.
+        At least one; paths, or URLs.
     sample_rate_hz : float or None
         Only where the log does not say.
     start_s, end_s : float or None
@@ -120,7 +120,7 @@ class CampaignRun(Table):
     motor_speed_rpm: NonNegative | None = None
     start_train_speed_km_h: NonNegative | None = None
     start_motor_speed_rpm: NonNegative | None = None
-    logs: Annotated[tuple[StatedPath, ...], Field(min_length=1)]
+    logs: Annotated[tuple[StatedLog, ...], Field(min_length=1)]
     sample_rate_hz: Positive | None = None
     start_s: float | None = None
     end_s: float | None = None

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 from pydantic import ValidationError
 
 from tdacoustic.errors import FleetError
+from tdacoustic.fleet.design_sweep import DesignSweep
 from tdacoustic.fleet.entries import entry_at, split_entry, with_entry
 from tdacoustic.fleet.gear_dynamics import GearDynamics
 from tdacoustic.fleet.gear_pair import GearPair
@@ -23,7 +24,7 @@ from tdacoustic.fleet.parameter import Parameter
 from tdacoustic.fleet.radiation import Radiation
 from tdacoustic.fleet.sections import SECTIONS, STUDIES, FleetFile
 from tdacoustic.fleet.si import si_value
-from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
+from tdacoustic.fleet.studies import Feature, Reference
 from tdacoustic.fleet.study_problems import study_problems
 from tdacoustic.fleet.train import Train
 from tdacoustic.fleet.what_if import WhatIf

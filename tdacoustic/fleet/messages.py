@@ -12,6 +12,7 @@ from pydantic import BaseModel
 from pydantic_core import ErrorDetails
 
 from tdacoustic.errors import FleetError
+from tdacoustic.fleet.design_sweep import DesignSweep
 from tdacoustic.fleet.gear_dynamics import GearDynamics
 from tdacoustic.fleet.gear_pair import GearPair
 from tdacoustic.fleet.housing import Housing, HousingSeat, Material
@@ -22,7 +23,7 @@ from tdacoustic.fleet.operation import Operation
 from tdacoustic.fleet.parameter import PARAMETER_KEYS, Parameter
 from tdacoustic.fleet.radiation import Radiation
 from tdacoustic.fleet.sections import FleetFile
-from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
+from tdacoustic.fleet.studies import Feature, Reference
 from tdacoustic.fleet.train import Train
 from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import TOP_LEVEL, Vocabulary, file_error, joined, nearest, problem_words, shown

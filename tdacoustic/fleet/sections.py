@@ -6,6 +6,7 @@ from typing import Annotated, Any, Final
 
 from pydantic import Field
 
+from tdacoustic.fleet.design_sweep import DesignSweep
 from tdacoustic.fleet.gear_dynamics import GearDynamics
 from tdacoustic.fleet.gear_pair import GearPair
 from tdacoustic.fleet.housing import Housing
@@ -14,7 +15,7 @@ from tdacoustic.fleet.model import Model
 from tdacoustic.fleet.motor import Motor
 from tdacoustic.fleet.operation import Operation
 from tdacoustic.fleet.radiation import Radiation
-from tdacoustic.fleet.studies import DesignSweep, Feature, Reference
+from tdacoustic.fleet.studies import Feature, Reference
 from tdacoustic.fleet.train import Train
 from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import Table, Text

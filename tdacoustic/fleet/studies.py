@@ -1,35 +1,27 @@
-"""``[[sweep]]``, ``[[reference]]`` and ``[[feature]]``: what is asked of a model besides its prediction.
+"""``[[reference]]`` and ``[[feature]]``: numbers and shapes of another source beside the model's.
 
-They hold no parameters of the drive: sweeps ask for other values of them, references and features put numbers and
-shapes of another source beside the model's.
+Like ``[[sweep]]`` they hold no parameters of the drive.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from typing import Annotated, Any, Final, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from tdacoustic.fleet.keys import flat_keys
-from tdacoustic.toml_models import Name, Table, Text, each_once, shown
+from tdacoustic.toml_models import Name, Table, Text, each_once
 
 __all__ = [
     "FLAT_DB",
-    "MOST_POINTS",
     "NEEDS_AT",
     "NEEDS_VALUE",
-    "DesignSweep",
     "Feature",
     "Over",
     "Quantity",
     "Reference",
     "Shape",
 ]
-
-MOST_POINTS: Final = 2000
-"""Points that one ``[[sweep]]`` may have."""
 
 Quantity = Literal[
     "spl_4m_db",
@@ -78,30 +70,6 @@ FLAT_DB: Final = 0.5
 """Within which values count as level [assumed]."""
 _NEAR_DB: Final = 1.0
 """Within which two numbers count as the same [assumed]."""
-_AS: Final = '{ "masuda.constant_db" = [20, 30] }'
-
-
-def _assignments(value: Any) -> tuple[tuple[str, tuple[Any, ...]], ...]:
-    pairs = flat_keys(value) if isinstance(value, Mapping) else value if isinstance(value, tuple) else None
-    if pairs is None or not all(isinstance(pair, tuple) and len(pair) == 2 for pair in pairs):
-        raise ValueError(f"must be a table of lists, as {_AS}, got {shown(value)}")
-    if not pairs:
-        raise ValueError(f"must name a key with a list of values, as {_AS}, got an empty table")
-    for key, values in pairs:
-        if not isinstance(values, tuple) or not values:
-            raise ValueError(f"must have a list of values for {key!r}, got {shown(values)}")
-        for number, one in enumerate(values):
-            if not _is_finite(one):
-                raise ValueError(f"must have finite values for {key!r}, got {shown(one)}")
-            if any(one == other and isinstance(one, bool) == isinstance(other, bool) for other in values[:number]):
-                raise ValueError(f"names {shown(one)} twice for {key!r}")
-    return pairs
-
-
-def _is_finite(value: Any) -> bool:
-    if isinstance(value, tuple):
-        return all(_is_finite(entry) for entry in value)
-    return not isinstance(value, float) or math.isfinite(value)
 
 
 def _names(value: Any) -> Any:
@@ -119,37 +87,6 @@ Names = Annotated[tuple[Name, ...], BeforeValidator(_names), Field(min_length=1)
 
 Places = Annotated[tuple[Name, ...], BeforeValidator(_places), AfterValidator(each_once)]
 """Names of conditions, or helix angles as numbers."""
-
-
-class DesignSweep(Table):
-    """One ``[[sweep]]``: a grid of values of the fleet's parameters, each point a prediction of its own.
-
-    Parameters
-    ----------
-    name : str
-        Unique.
-    parameters : tuple of (str, tuple)
-        In the file a table: by dotted key of a parameter, or of an entry of a list, its values in the unit of the key.
-        The grid is all combinations, the last key fastest.
-    conditions : tuple of str
-        Which to compute; default all.
-    """
-
-    name: Name
-    parameters: Annotated[tuple[tuple[str, tuple[Any, ...]], ...], PlainValidator(_assignments)]
-    conditions: Annotated[tuple[Name, ...], AfterValidator(each_once)] = ()
-
-    @property
-    def n_points(self) -> int:
-        """How many points the grid has."""
-        return math.prod(len(values) for _, values in self.parameters)
-
-    @model_validator(mode="after")
-    def _not_too_many(self) -> DesignSweep:
-        if self.n_points > MOST_POINTS:
-            lengths = " x ".join(str(len(values)) for _, values in self.parameters)
-            raise ValueError(f"parameters has {lengths} = {self.n_points} points, allowed are {MOST_POINTS}")
-        return self
 
 
 class Reference(Table):

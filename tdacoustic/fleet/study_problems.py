@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 from tdacoustic.errors import FleetError
+from tdacoustic.fleet.design_sweep import Range, Swept
 from tdacoustic.fleet.entries import split_entry
 from tdacoustic.fleet.messages import key_problem
 from tdacoustic.toml_models import nearest, shown
@@ -37,9 +38,9 @@ def study_problems(fleet: Fleet) -> Iterator[str]:
             yield f"[[{kind}]]: the name {twice!r} stands twice"
     for sweep in fleet.sweep:
         where = f"[[sweep]] {sweep.name!r}"
-        for key, values in sweep.parameters:
+        for key, held in sweep.parameters:
             problem = _key_problem(fleet, key)
-            wrong = [*_value_problems(fleet, key, values)] if problem is None else [problem]
+            wrong = [*_swept_problems(fleet, key, held)] if problem is None else [problem]
             yield from (f"{where}: {one}" for one in wrong)
         yield from (f"{where}: {problem}" for problem in _foreign(fleet, sweep.conditions))
     for number, reference in enumerate(fleet.reference, 1):
@@ -92,6 +93,10 @@ def _key_problem(fleet: Fleet, key: str) -> str | None:
     return problem
 
 
+def _swept_problems(fleet: Fleet, key: str, held: Swept) -> Iterator[str]:
+    yield from _range_problems(fleet, key, held) if isinstance(held, Range) else _value_problems(fleet, key, held)
+
+
 def _value_problems(fleet: Fleet, key: str, values: Sequence[Any]) -> Iterator[str]:
     """Values of a sweep that are of another kind than the parameter's; numbers out of range are points without a row.
 
@@ -106,11 +111,36 @@ def _value_problems(fleet: Fleet, key: str, values: Sequence[Any]) -> Iterator[s
     if wrong:
         yield f"parameters must have {_KINDS[kind]} for {key!r}, got {', '.join(shown(value) for value in wrong)}"
     elif kind == "words":
-        for value in values:
-            try:
-                fleet.replaced({key: value})
-            except FleetError as error:
-                yield str(error).removeprefix(f"{fleet.path}: ").splitlines()[0]
+        yield from (problem for value in values if (problem := _refused(fleet, key, value)) is not None)
+
+
+def _range_problems(fleet: Fleet, key: str, held: Range) -> Iterator[str]:
+    """A range of what is no single number, or one that reaches beyond what a file may have.
+
+    Of a parameter that the file leaves out nothing is known here.
+    """
+    try:
+        own = fleet.value_of(key)
+    except FleetError:
+        return
+    if isinstance(own, tuple):
+        yield f"parameters has a range for {key!r}, which is a list: name one of its entries, as '{key}.1'"
+    elif _kind(own) != "numbers":
+        yield f"parameters has a range for {key!r}, which is no number: it is {shown(own)}"
+    elif isinstance(own, int) and not (isinstance(held.low, int) and isinstance(held.high, int)):
+        yield f"parameters must have whole numbers as from and to in the range of {key!r}"
+    else:
+        refused = (_refused(fleet, key, end) for end in (held.low, held.high))
+        yield from (f"the range of {key!r} reaches too far: {problem}" for problem in refused if problem is not None)
+
+
+def _refused(fleet: Fleet, key: str, value: Any) -> str | None:
+    """Why a file could not have a value, in one line; None where it could."""
+    try:
+        fleet.replaced({key: value})
+    except FleetError as error:
+        return str(error).removeprefix(f"{fleet.path}: ").splitlines()[0]
+    return None
 
 
 def _kind(value: Any) -> str:

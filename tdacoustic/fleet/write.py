@@ -6,10 +6,10 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from tdacoustic.fleet.design_sweep import DesignSweep, Range
 from tdacoustic.fleet.fleet import Fleet
 from tdacoustic.fleet.parameter import ASSUMED, Parameter
 from tdacoustic.fleet.sections import SCHEMA, SECTIONS, STUDIES
-from tdacoustic.fleet.studies import DesignSweep
 from tdacoustic.fleet.what_if import WhatIf
 from tdacoustic.toml_models import Table
 
@@ -77,6 +77,9 @@ def _text(text: str) -> str:
 
 
 def _value(value: Any) -> str:
+    if isinstance(value, Range):
+        scale = "" if value.scale == "linear" else f", scale = {_text(value.scale)}"
+        return f"{{ from = {_value(value.low)}, to = {_value(value.high)}{scale} }}"
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, str):

@@ -37,6 +37,7 @@ class RunLevel:
     `level_db`, `laeq_db` and `level_band_db` are corrected for background, each
     by its own; `rms` is as measured. `calibration` is what calibrators before and
     after say of the channel: ``"ok"`` or ``"doubtful"``, empty where there were none.
+    `distance_m` and `role` are of a microphone, as the campaign says.
     """
 
     run: str
@@ -56,6 +57,8 @@ class RunLevel:
     level_band_from_hz: float
     level_band_to_hz: float
     calibration: str = ""
+    distance_m: float | None = None
+    role: str | None = None
 
 
 @dataclass(frozen=True)
@@ -204,6 +207,8 @@ def _run_level(
         level_band_from_hz=result.level_band_hz[0],
         level_band_to_hz=result.level_band_hz[1],
         calibration=_calibration(run, channel.name),
+        distance_m=channel.distance_m,
+        role=channel.role,
     )
 
 

@@ -8,6 +8,7 @@ said by its `Origin`, which the page shows as a tag with words, never by colour 
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Final, Literal, TypeAlias, get_args
@@ -24,6 +25,7 @@ __all__ = [
     "Fact",
     "Facts",
     "FigureBlock",
+    "Link",
     "Notice",
     "Origin",
     "Paragraph",
@@ -35,9 +37,37 @@ __all__ = [
 
 Origin = Literal["measured", "synthetic", "printed", "assumed", "calculated"]
 ORIGINS: Final[tuple[str, ...]] = get_args(Origin)
+DocumentOrigin = Literal["measured", "synthetic", "printed", "assumed", "calculated", "mixed"]
 NoticeKind = Literal["info", "warning", "bad", "synthetic", "assumed"]
-ColumnKind = Literal["number", "text", "origin", "verdict"]
-Cell: TypeAlias = str | float | int | bool | None
+ColumnKind = Literal["number", "text", "origin", "verdict", "source"]
+
+
+@dataclass(frozen=True)
+class Link:
+    """A cell that leads to a file beside the page.
+
+    Parameters
+    ----------
+    text : str
+        What is shown, sorted by and downloaded.
+    href : str
+        A relative path in the signs of URLs, ``"../a%20b/report.html"``.
+
+    Raises
+    ------
+    ReportError
+        It leads anywhere else: a scheme, a host, an absolute path.
+    """
+
+    text: str
+    href: str
+
+    def __post_init__(self) -> None:
+        if not re.fullmatch(r"(?!/)[A-Za-z0-9%._~/-]+", self.href):
+            raise ReportError(f"a link must be a relative path in the signs of URLs, got {self.href!r}")
+
+
+Cell: TypeAlias = str | float | int | bool | Link | None
 
 
 def _check_origin(origin: str | None, what: str) -> None:
@@ -125,9 +155,10 @@ class Column:
         Shown below the title, ``"dB re 20 uPa"``.
     digits : int, optional
         Decimals of its numbers; default: six significant digits.
-    kind : {"number", "text", "origin", "verdict"}
+    kind : {"number", "text", "origin", "verdict", "source"}
         ``"origin"`` cells are one of `ORIGINS`, ``"verdict"`` cells are ``ok``, ``warning``,
-        ``bad`` or another word; both are shown as tags.
+        ``bad`` or another word, ``"source"`` cells begin with a source of noise (``motor 97 %``);
+        all are shown as tags.
     align : {"left", "right", "center"}, optional
         Default: numbers to the right, all else to the left.
     """
@@ -159,7 +190,7 @@ class Table:
     columns : sequence of Column
         At least one, with different keys.
     rows : sequence of sequences
-        One cell a column: text, number, bool, or None (also NaN) for not determined.
+        One cell a column: text, number, bool, `Link`, or None (also NaN) for not determined.
     csv : str, optional
         Name of the download; default ``<name>.csv``.
     origin : str, optional
@@ -189,7 +220,7 @@ class Table:
             if len(row) != len(columns):
                 raise ReportError(f"row {number} of table {self.name!r} has {len(row)} cells, expected {len(columns)}")
             for column, cell in zip(columns, row, strict=True):
-                if column.kind == "number" and isinstance(cell, str):
+                if column.kind == "number" and isinstance(cell, str | Link):
                     raise ReportError(f"column {column.key!r} of table {self.name!r} is of numbers, got {cell!r}")
                 if column.kind == "origin" and cell is not None:
                     _check_origin(str(cell), f"row {number} of table {self.name!r}")
@@ -207,9 +238,9 @@ def _plain(cell: object) -> Cell:
     value = cell.item() if hasattr(cell, "item") else cell
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    if value is None or isinstance(value, str | bool | int | float):
+    if value is None or isinstance(value, str | bool | int | float | Link):
         return value
-    raise ReportError(f"a cell is text, a number, a bool or None, got {value!r}")
+    raise ReportError(f"a cell is text, a number, a bool, a link or None, got {value!r}")
 
 
 @dataclass(frozen=True)
@@ -268,8 +299,8 @@ class Document:
     ----------
     title, subtitle : str
         Head of the page.
-    origin : {"measured", "synthetic", "printed", "assumed", "calculated"}
-        Of the data that the report is about; shown beside the title.
+    origin : {"measured", "synthetic", "printed", "assumed", "calculated", "mixed"}
+        Of the data that the report is about; shown beside the title. Of ``"mixed"`` data each number says its own.
     summary : sequence of blocks
         What the reader needs if they read nothing else.
     notices : sequence of Notice
@@ -289,7 +320,7 @@ class Document:
 
     title: str
     subtitle: str
-    origin: Origin
+    origin: DocumentOrigin
     summary: Sequence[Block] = ()
     notices: Sequence[Notice] = ()
     sections: Sequence[Section] = ()
@@ -297,7 +328,8 @@ class Document:
     footer: Sequence[str] = ()
 
     def __post_init__(self) -> None:
-        _check_origin(self.origin, "a document")
+        if self.origin != "mixed":
+            _check_origin(self.origin, "a document")
         object.__setattr__(self, "facts", Facts(self.facts).pairs)
         for key in ("summary", "notices", "sections", "footer"):
             value = getattr(self, key)

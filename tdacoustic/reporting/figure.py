@@ -93,6 +93,8 @@ class Axis:
         Reference of a level, ``"20 uPa"``.
     note : str, optional
         What else the number depends on, ``"density, per Hz"``.
+    names : sequence of str
+        Of the places 0, 1, 2, ... along a linear axis, instead of numbers.
 
     Examples
     --------
@@ -106,8 +108,12 @@ class Axis:
     limits: tuple[float, float] | None = None
     reference: str | None = None
     note: str | None = None
+    names: Sequence[str] = ()
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "names", tuple(self.names))
+        if self.names and self.log:
+            raise ReportError(f"axis {self.label!r} has names, it must be linear")
         if self.scale not in ("linear", "log"):
             raise ReportError(f"scale of axis {self.label!r} must be 'linear' or 'log', got {self.scale!r}")
         if self.limits is not None:

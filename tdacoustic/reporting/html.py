@@ -31,6 +31,7 @@ from tdacoustic.reporting.document import (
     Document,
     Facts,
     FigureBlock,
+    Link,
     Notice,
     Paragraph,
     Section,
@@ -60,7 +61,10 @@ _ORIGIN_WORDS: Final = {
     "printed": "The data of this report were taken from a publication.",
     "assumed": "The data of this report are assumptions.",
     "calculated": "The data of this report were calculated by a model. They are not measurements.",
+    "mixed": "The data of this report are of several origins. Each number says its own.",
 }
+_SOURCES: Final = frozenset({"motor", "gearbox", "undecided", "mixed"})
+"""Sources that have a look of their own."""
 
 
 def safe_json(value: object) -> str:
@@ -111,19 +115,29 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     """What a cell shows, and what it sorts and downloads as (``raw``; None: the same)."""
     align = column.align or ("right" if column.kind == "number" else "left")
     tag = 'th scope="row"' if first and column.kind == "text" else "td"
-    view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None}
+    view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None, "href": None}
     if cell is None:
         return view | {"text": "\u2013" if column.kind == "number" else "", "raw": ""}
+    if isinstance(cell, Link):
+        return view | {"text": cell.text, "href": cell.href, "raw": _raw(cell.text)}
     if isinstance(cell, bool):
         return view | {"text": "yes" if cell else "no", "raw": "true" if cell else "false"}
     if not isinstance(cell, str):
         text, raw = _number(cell, column.digits), f"{cell:.9g}"
         return view | {"text": text, "raw": None if raw == text else raw}
-    raw = csv_cell(cell)
+    if column.kind == "source" and cell:
+        word = cell.split()[0].rstrip(",:")
+        view["chip"] = f"source-{word if word in _SOURCES else 'other'}"
     if column.kind in ("origin", "verdict") and cell:
         known = column.kind == "origin" or cell in ("ok", "warning", "bad")
         view["chip"] = f"{column.kind}-{cell}" if known else "verdict-other"
-    return view | {"text": cell, "raw": None if raw == cell.strip() else raw}
+    return view | {"text": cell, "raw": _raw(cell)}
+
+
+def _raw(text: str) -> str | None:
+    """What a text downloads as; None: as it is shown."""
+    raw = csv_cell(text)
+    return None if raw == text.strip() else raw
 
 
 def _table(table: Table) -> dict[str, Any]:

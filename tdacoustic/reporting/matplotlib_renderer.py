@@ -201,6 +201,8 @@ def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], r
             one.set_major_locator(FixedLocator(values))
             one.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
             one.set_minor_locator(NullLocator())
+    if axis.names:
+        one.set_ticks(range(len(axis.names)), axis.names)
     ends = tuple(10.0**end for end in limits) if axis.log else limits
     (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
     (axes.set_xlabel if which == "x" else axes.set_ylabel)("\n".join(wrapped(axis.caption, room, 4.3)))

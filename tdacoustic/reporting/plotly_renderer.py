@@ -68,6 +68,9 @@ def _axis(axis: Axis, limits: tuple[float, float], room: float, grid: bool) -> d
         values = log_ticks(*limits)
         if len(values) >= 3:
             layout |= {"tickmode": "array", "tickvals": values, "ticktext": [tick_text(value) for value in values]}
+    if axis.names:
+        names = [escape_text(name) for name in axis.names]
+        layout |= {"tickmode": "array", "tickvals": list(range(len(names))), "ticktext": names}
     return layout
 
 

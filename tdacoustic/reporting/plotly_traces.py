@@ -69,7 +69,8 @@ def _hover(figure: Figure, name: str, detail: bool = False) -> str:
         )
     else:
         lines.append(f"{escape_text(figure.x_axis.label)}: %{{x:.6~r}} {escape_text(figure.x_axis.unit_text)}".rstrip())
-    lines.append(f"{escape_text(figure.y_axis.label)}: %{{y:.4~r}} {escape_text(figure.y_axis.unit_text)}".rstrip())
+    place = "%{y}" if figure.y_axis.names else "%{y:.4~r}"
+    lines.append(f"{escape_text(figure.y_axis.label)}: {place} {escape_text(figure.y_axis.unit_text)}".rstrip())
     if detail:
         lines.append("%{hovertext}")
     return "<br>".join(lines) + "<extra></extra>"

@@ -33,7 +33,7 @@ class FleetPrediction:
         ``conditions``, ``predictions``, ``sound_lines``, ``directivity``, ``bearing_forces``, ``helix``,
         ``speed_sweep``, ``coupling``, ``coupling_conditions``, ``near_field``, ``what_if``,
         ``patterns``, ``pattern_correlation``, ``sensitivity``, ``references``, ``features``, ``sweep_points``,
-        ``sweeps``.
+        ``sweeps``, ``sweep_sensitivity``.
     inputs : tuple of LogInput
         The fleet file.
     records : tuple of (str, Record)

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from tdacoustic.errors import MissingFileError
 
-__all__ = ["LogFile", "log_file"]
+__all__ = ["HashMemory", "LogFile", "log_file"]
 
 _RACY_S = 2.0
 """A file changed this shortly before it was hashed could change again within one tick of its time stamp."""
@@ -42,12 +42,15 @@ class LogFile:
     n_bytes : int
     companions : tuple of LogFile
         The further files that the log consists of.
+    url : str or None
+        Whence it was fetched, for who does not see the path; no part of any key.
     """
 
     path: Path
     sha256: str
     n_bytes: int
     companions: tuple[LogFile, ...] = ()
+    url: str | None = None
 
     @property
     def files(self) -> tuple[LogFile, ...]:
@@ -76,7 +79,9 @@ def _remembered(store: HashMemory, path: Path, identity: dict[str, int]) -> str 
     return sha256 if isinstance(sha256, str) else None
 
 
-def log_file(path: Path, store: HashMemory | None = None, companions: Sequence[Path] = ()) -> LogFile:
+def log_file(
+    path: Path, store: HashMemory | None = None, companions: Sequence[Path] = (), url: str | None = None
+) -> LogFile:
     """Hash a log, or look its hash up where size and time stamps are as they were.
 
     Parameters
@@ -87,6 +92,8 @@ def log_file(path: Path, store: HashMemory | None = None, companions: Sequence[P
         Remembers hashes between sessions, keyed by path, size and time of change.
     companions : sequence of Path
         Further files that the log consists of (`tdacoustic.recording.Log.companions`), hashed like it.
+    url : str, optional
+        Whence the log was fetched.
 
     Raises
     ------
@@ -100,9 +107,9 @@ def log_file(path: Path, store: HashMemory | None = None, companions: Sequence[P
     identity = {"size": stat.st_size, "mtime_ns": stat.st_mtime_ns, "ctime_ns": stat.st_ctime_ns}
     remembered = None if store is None else _remembered(store, path, identity)
     if remembered is not None:
-        return LogFile(path, remembered, stat.st_size, others)
+        return LogFile(path, remembered, stat.st_size, others, url)
     with path.open("rb") as stream:
         digest = hashlib.file_digest(stream, "sha256").hexdigest()
     if store is not None and time.time_ns() - stat.st_mtime_ns > _RACY_S * 1e9:
         store.remember_hash(path, json.dumps({**identity, "sha256": digest}))
-    return LogFile(path, digest, stat.st_size, others)
+    return LogFile(path, digest, stat.st_size, others, url)

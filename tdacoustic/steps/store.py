@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
 import struct
 import time
 import zipfile
 import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from uuid import uuid4
 
 import numpy as np
@@ -71,6 +73,12 @@ class Store:
         """Keep a result and its record under a key."""
         arrays: list[NDArray[Any]] = []
         tree = {"schema": "tdacoustic-result/1", "result": encode(result, arrays), "record": encode(record, [])}
+        names: dict[str, Any] = {f"a{index}": array for index, array in enumerate(arrays)}
+        text = np.frombuffer(canonical_json(tree).encode(), dtype=np.uint8)
+        self._keep(key, lambda stream: np.savez(stream, tree=text, **names))
+
+    def _keep(self, key: str, write: Callable[[BinaryIO], object]) -> None:
+        """Write a key's file under a temporary name and move it."""
         target = self._path(key)
         try:
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -78,21 +86,39 @@ class Store:
             temporary = target.with_name(f"{key}.{uuid4().hex}.tmp")
             try:
                 with temporary.open("wb") as stream:
-                    names: dict[str, Any] = {f"a{index}": array for index, array in enumerate(arrays)}
-                    np.savez(stream, tree=np.frombuffer(canonical_json(tree).encode(), dtype=np.uint8), **names)
+                    write(stream)
                     stream.flush()
                     os.fsync(stream.fileno())
-                temporary.replace(target)
+                _replace(temporary, target)
             finally:
                 temporary.unlink(missing_ok=True)
         except OSError as error:
             raise StoreError(f"the store {self.folder} cannot be written: {error}") from error
 
-    def _tree(self, key: str, bundle: Any) -> Any:
-        tree = json.loads(bytes(bundle["tree"]).decode())
-        if tree.get("schema") != "tdacoustic-result/1":
-            raise StoreError(f"{self._path(key)}: schema {tree.get('schema')!r} is not 'tdacoustic-result/1'")
-        return tree
+    def read_bytes(self, key: str) -> bytes:
+        """Return the file of a key as it is, to be kept elsewhere; raises KeyError as `load` does."""
+        path = self._path(key)
+        try:
+            data = path.read_bytes()
+        except OSError:
+            raise KeyError(key) from None
+        try:
+            _check_whole(key, data)
+        except StoreError as error:
+            path.unlink(missing_ok=True)
+            raise KeyError(str(error)) from error
+        return data
+
+    def write_bytes(self, key: str, data: bytes) -> None:
+        """Keep what another store's `read_bytes` gave.
+
+        Raises
+        ------
+        StoreError
+            It is not whole, or cannot be written.
+        """
+        _check_whole(key, data)
+        self._keep(key, lambda stream: stream.write(data))
 
     def load(self, key: str) -> Any:
         """Return the result under a key.
@@ -105,8 +131,7 @@ class Store:
         path = self._path(key)
         try:
             with np.load(path, allow_pickle=False) as bundle:
-                arrays = [bundle[f"a{index}"] for index in range(len(bundle.files) - 1)]
-                return decode(self._tree(key, bundle)["result"], arrays)
+                return _decoded(path.name, bundle)
         except FileNotFoundError:
             raise KeyError(key) from None
         except _DAMAGED as error:
@@ -117,12 +142,22 @@ class Store:
         """Return the record of a key; raises KeyError as `load` does."""
         try:
             with np.load(self._path(key), allow_pickle=False) as bundle:
-                record = decode(self._tree(key, bundle)["record"], [])
+                record = decode(_tree(key, bundle)["record"], [])
         except _DAMAGED as error:
             raise KeyError(key) from error
         if not isinstance(record, Record):
             raise KeyError(key)
         return record
+
+    def is_whole(self, key: str) -> bool:
+        """Whether there is a result under a key whose record can be read."""
+        if key not in self:
+            return False
+        try:
+            self.record(key)
+        except KeyError:
+            return False
+        return True
 
     def _hash_path(self, path: Path) -> Path:
         name = hashlib.sha256(str(path.resolve()).encode()).hexdigest()
@@ -146,6 +181,37 @@ class Store:
         except OSError:
             with suppress(OSError):
                 temporary.unlink()
+
+
+def _replace(temporary: Path, target: Path) -> None:
+    """Move a result into place; where Windows refuses that, because somebody reads the same key's, that one stays."""
+    try:
+        temporary.replace(target)
+    except PermissionError:
+        if not target.is_file():
+            raise
+
+
+def _tree(name: str, bundle: Any) -> Any:
+    tree = json.loads(bytes(bundle["tree"]).decode())
+    if tree.get("schema") != "tdacoustic-result/1":
+        raise StoreError(f"{name}: schema {tree.get('schema')!r} is not 'tdacoustic-result/1'")
+    return tree
+
+
+def _decoded(name: str, bundle: Any) -> Any:
+    arrays = [bundle[f"a{index}"] for index in range(len(bundle.files) - 1)]
+    return decode(_tree(name, bundle)["result"], arrays)
+
+
+def _check_whole(key: str, data: bytes) -> None:
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as bundle:
+            _decoded(key, bundle)
+            if not isinstance(decode(_tree(key, bundle)["record"], []), Record):
+                raise StoreError("there is no record in it")
+    except _DAMAGED as error:
+        raise StoreError(f"{key}: these {len(data)} bytes are no whole result ({error})") from error
 
 
 def _sweep(folder: Path) -> None:

@@ -43,6 +43,9 @@ _PATHS: Final = ("structure", "mesh", "motor")
 _OF_POINT_SOURCES: Final = ("radiation", "train", "housing", "masuda.placement", "masuda.position_m")
 """What it may depend on how a point source of some frequency and place is heard."""
 
+_MOST_MOTIONS: Final = 1000
+"""Motions of changed fleets that are kept, 60 kB each."""
+
 
 @dataclass(frozen=True)
 class Case:
@@ -107,6 +110,8 @@ class _Model(DriveModel):
     ----------
     keep : bool
         Whether what it finds becomes known.
+    keep_motions : bool
+        Whether its motions become known.
     same_air : bool
         Whether point sources are heard as in the fleet as it is.
     integrate : bool
@@ -122,9 +127,11 @@ class _Model(DriveModel):
         keep: bool = False,
         same_air: bool = True,
         integrate: bool = True,
+        keep_motions: bool = False,
     ) -> None:
         super().__init__(fleet, unit, housing)
         self._known, self._keep, self._same_air, self._integrate = known, keep, same_air, integrate
+        self._keep_motions = keep or keep_motions
 
     def motion(self, condition: Condition, unit: GearUnit | None = None) -> SteadyState:
         unit = self._moved(unit)
@@ -135,7 +142,7 @@ class _Model(DriveModel):
             found = super().motion(condition, unit) if self._integrate else balanced_state(*key)
             if found is None:
                 raise _NotBalanced(f"{self.fleet.path}: condition {condition.name}: the balance finds no stable motion")
-            if self._keep:
+            if self._keep_motions and len(known) < _MOST_MOTIONS:
                 known[key] = found
         return found
 
@@ -179,6 +186,10 @@ class CaseModel:
         Of the fleet, from its ``[operation]`` or a campaign's.
     helix : bool
         Whether the helix angles of ``[operation]`` are wanted too.
+    integrate : bool
+        Whether motions of the fleet as it is are integrated in time where the balance finds none.
+    keep : bool
+        Whether motions of changed fleets are kept: many of a study's points have the same gears.
 
     Attributes
     ----------
@@ -193,15 +204,22 @@ class CaseModel:
     """
 
     def __init__(
-        self, fleet: Fleet, housing: HousingSound | None, conditions: Sequence[Condition], helix: bool = True
+        self,
+        fleet: Fleet,
+        housing: HousingSound | None,
+        conditions: Sequence[Condition],
+        helix: bool = True,
+        integrate: bool = True,
+        keep: bool = False,
     ) -> None:
         self.fleet = fleet
         self._housing, self._conditions, self._with_helix = housing, tuple(conditions), helix
+        self._keep = keep
         self._known = _Known()
         self._unit = gear_unit_of(fleet)
         self._helix = self._helix_units(fleet)
         self._signature = housing_signature(fleet)
-        model = _Model(fleet, self._unit, housing, self._known, keep=True)
+        model = _Model(fleet, self._unit, housing, self._known, keep=True, integrate=integrate)
         self.base = self._values(model, self._helix, self._conditions)
 
     def needs_vectors(self, changed: Fleet) -> bool:
@@ -234,7 +252,8 @@ class CaseModel:
             conditions = conditions_under(self.fleet, changed, conditions)
         housing = None if self._housing is None else reseated(self._housing, self.fleet, changed, unit)
         same_air = all(attrgetter(name)(changed) == attrgetter(name)(self.fleet) for name in _OF_POINT_SOURCES)
-        model = _Model(changed, unit, housing, self._known, same_air=same_air, integrate=integrate)
+        asked = {"same_air": same_air, "integrate": integrate, "keep_motions": self._keep}
+        model = _Model(changed, unit, housing, self._known, **asked)
         return self._values(model, helix, conditions)
 
     def _values(

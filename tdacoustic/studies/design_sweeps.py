@@ -1,12 +1,11 @@
-"""Design sweeps: a prediction for each point of a grid of parameters, as steps that are kept."""
+"""Design sweeps: a prediction for each point of a design, in batches that are steps of their own."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,91 +13,42 @@ from numpy.typing import NDArray
 from tdacoustic.drive import Condition, HousingSound, gear_unit_of
 from tdacoustic.errors import TdacousticError
 from tdacoustic.fleet import Fleet
-from tdacoustic.fleet.studies import DesignSweep
+from tdacoustic.fleet.design_sweep import DesignSweep
 from tdacoustic.steps import Step, Task
 from tdacoustic.steps.progress import tell_progress
 from tdacoustic.studies.cases import QUANTITIES, Case, CaseModel
-from tdacoustic.studies.changed_fleet import housing_signature
-from tdacoustic.studies.responses import ModelSettings, bare_fleet, fleet_of, reason_of
+from tdacoustic.studies.designs import Assignments, points_of
+from tdacoustic.studies.responses import fleet_of, reason_of
 
-__all__ = [
-    "DESIGN_SWEEP",
-    "SWEEP_GROUPS",
-    "Assignments",
-    "SweepGroups",
-    "SweepPart",
-    "SweepResult",
-    "assembled",
-    "fleet_at",
-    "groups_task",
-    "points_of",
-    "sweep_task",
-]
+__all__ = ["DESIGN_SWEEP", "SweepPart", "SweepResult", "assembled", "fleet_at", "helix_key", "sweep_task"]
 
 Real = NDArray[np.float64]
-
-Assignments = tuple[tuple[str, Any], ...]
-"""Values by key, of one point."""
 
 SWEPT: Final = "swept"
 """Origin of a value that a point has instead of the fleet's."""
 
-
-@dataclass(frozen=True, eq=False)
-class SweepSettings:
-    """What the points of a sweep depend on.
-
-    Parameters
-    ----------
-    model : ModelSettings
-        Of a fleet whose transfer vectors are those of every point.
-    points : tuple of Assignments
-    """
-
-    model: ModelSettings
-    points: tuple[Assignments, ...]
+OTHER_CONDITIONS: Final = "has other conditions than the fleet"
 
 
 @dataclass(frozen=True)
-class GroupSettings:
-    """What the grouping of points depends on.
+class BatchSettings:
+    """What a batch depends on besides the housing.
 
     Parameters
     ----------
     fleet : str
-        See `bare_fleet`.
+        See `bare_fleet`; one whose transfer vectors are those of every point.
+    conditions : tuple of Condition
+        Of that fleet.
     points : tuple of Assignments
-    own : tuple of str
-        Signature of the fleet's housing; it changes with the versions of its steps.
+    integrate : bool
+        Whether motions that the harmonic balance does not find are integrated in time, which takes seconds each.
     """
 
     fleet: str
+    conditions: tuple[Condition, ...]
     points: tuple[Assignments, ...]
-    own: tuple[str, ...]
-
-
-@dataclass(frozen=True)
-class SweepGroups:
-    """Which points of a sweep share a housing.
-
-    Parameters
-    ----------
-    group : tuple of int
-        Of each point; 0 has the fleet's own housing, or none as the fleet has.
-    reasons : tuple of str
-        Why a point cannot be; empty of one that can.
-    """
-
-    group: tuple[int, ...]
-    reasons: tuple[str, ...]
-
-    def members(self) -> dict[int, list[int]]:
-        """Return the numbers of the points of each group, those left out that cannot be."""
-        found: dict[int, list[int]] = {}
-        for number, (group, reason) in enumerate(zip(self.group, self.reasons, strict=True)):
-            if not reason:
-                found.setdefault(group, []).append(number)
-        return found
+    integrate: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,10 +58,10 @@ class SweepPart:
     Parameters
     ----------
     cases : tuple of Case
-        Of the conditions, with the speeds of the first point.
+        Of the conditions, with the speeds of the fleet that the batch is of.
     speed_km_h : ndarray, shape (points, cases)
     values : ndarray, shape (points, cases, quantities)
-        See `CaseValues`; NaN of points that cannot be.
+        See `CaseValues`; NaN of points that cannot be, and of gears that rattle where nothing is integrated.
     reasons : tuple of str
         Why a point cannot be; empty of one that can.
     """
@@ -130,13 +80,15 @@ class SweepResult:
     ----------
     sweep : DesignSweep
     points : tuple of Assignments
-        All combinations of its values, the last key fastest.
+        See `points_of`.
     conditions : tuple of str
     speed_km_h : ndarray, shape (points, conditions)
     values : ndarray, shape (points, conditions, quantities)
-        By `QUANTITIES`; NaN of points that cannot be.
+        By `QUANTITIES`; NaN of points that cannot be, and of those that rattle.
     reasons : tuple of str
         Why a point cannot be; empty of one that can.
+    whole : tuple of str
+        Keys with a range that take whole numbers alone.
     """
 
     sweep: DesignSweep
@@ -145,24 +97,21 @@ class SweepResult:
     speed_km_h: Real
     values: Real
     reasons: tuple[str, ...]
+    whole: tuple[str, ...] = ()
 
     def of(self, quantity: str) -> Real:
         """Return one quantity, shape (points, conditions)."""
         return np.asarray(self.values[..., QUANTITIES.index(quantity)])
 
+    @property
+    def can_be(self) -> NDArray[np.bool_]:
+        """Which points can be, shape (points,)."""
+        return np.array([not reason for reason in self.reasons], dtype=bool)
 
-def points_of(sweep: DesignSweep) -> tuple[Assignments, ...]:
-    """Return the points of a sweep's grid, the last key fastest.
-
-    Examples
-    --------
-    >>> sweep = DesignSweep(name="two", parameters=(("a.b", (1.0, 2.0)), ("c.d", ("x", "y"))))
-    >>> points_of(sweep)[1]
-    (('a.b', 1.0), ('c.d', 'y'))
-    """
-    keys = [key for key, _ in sweep.parameters]
-    grid = itertools.product(*(values for _, values in sweep.parameters))
-    return tuple(tuple(zip(keys, values, strict=True)) for values in grid)
+    @property
+    def rattles(self) -> NDArray[np.bool_]:
+        """Where the balance finds no stable motion and none was integrated, shape (points, conditions)."""
+        return np.asarray(self.can_be[:, None] & np.isnan(self.of("mesh_frequency_hz")))
 
 
 def fleet_at(fleet: Fleet, point: Assignments) -> Fleet:
@@ -176,18 +125,23 @@ def fleet_at(fleet: Fleet, point: Assignments) -> Fleet:
     FleetError
         A file could not have these values, or its gears cannot be.
     """
-    own = {key: value for key, value in point if key != _helix_key(fleet)}
-    changed = fleet.replaced(own, origin=SWEPT) if own else fleet
+    changed = _changed(fleet, point)
     gear_unit_of(changed, _helix_rad(fleet, point))
     return changed
 
 
-def _helix_key(fleet: Fleet) -> str:
+def _changed(fleet: Fleet, point: Assignments) -> Fleet:
+    own = {key: value for key, value in point if key != helix_key(fleet)}
+    return fleet.replaced(own, origin=SWEPT) if own else fleet
+
+
+def helix_key(fleet: Fleet) -> str:
+    """Return the key of the helix angle that a sweep moves without the housing."""
     return f"gear_pair.{fleet.modelled_pair_number}.helix_angle_deg"
 
 
 def _helix_deg(fleet: Fleet, point: Assignments) -> float | None:
-    found = dict(point).get(_helix_key(fleet))
+    found = dict(point).get(helix_key(fleet))
     return None if found is None else float(found)
 
 
@@ -196,78 +150,51 @@ def _helix_rad(fleet: Fleet, point: Assignments) -> float | None:
     return None if angle is None else math.radians(angle)
 
 
-def groups_task(label: str, fleet: Fleet, points: Sequence[Assignments]) -> Task:
-    """Return the task of the grouping of points by their housing.
-
-    Parameters
-    ----------
-    label : str
-    fleet : Fleet
-    points : sequence of Assignments
-    """
-    return SWEEP_GROUPS.task(label, GroupSettings(bare_fleet(fleet), tuple(points), housing_signature(fleet)))
-
-
-def _sweep_groups(settings: GroupSettings) -> SweepGroups:
-    fleet = fleet_of(settings.fleet)
-    numbers = {settings.own: 0}
-    groups, reasons = [], []
-    for place, point in enumerate(settings.points):
-        group, reason = 0, ""
-        try:
-            key = housing_signature(fleet_at(fleet, point))
-            group = numbers.setdefault(key, len(numbers))
-        except TdacousticError as error:
-            reason = reason_of(error)
-        groups.append(group)
-        reasons.append(reason)
-        tell_progress((place + 1) / len(settings.points))
-    return SweepGroups(tuple(groups), tuple(reasons))
-
-
 def sweep_task(
     label: str,
-    fleet: Fleet,
-    housing: HousingSound | None,
+    fleet: str,
+    housing: Task | None,
     conditions: Sequence[Condition],
     points: Sequence[Assignments],
+    integrate: bool = True,
 ) -> Task:
     """Return the task of points that share their transfer vectors with a fleet.
 
     Parameters
     ----------
     label : str
-    fleet : Fleet
-    housing : HousingSound or None
-        Of that fleet.
+    fleet : str
+    housing : Task or None
+        See `kept_housing`; none of point sources.
     conditions : sequence of Condition
-        Of that fleet.
     points : sequence of Assignments
+    integrate : bool
+        See `BatchSettings`.
     """
-    settings = SweepSettings(ModelSettings(bare_fleet(fleet), housing, tuple(conditions)), tuple(points))
-    return DESIGN_SWEEP.task(label, settings)
+    settings = BatchSettings(fleet, tuple(conditions), tuple(points), integrate)
+    return DESIGN_SWEEP.task(label, settings, **({} if housing is None else {"housing": housing}))
 
 
-def _design_sweep(settings: SweepSettings) -> SweepPart:
-    fleet = fleet_of(settings.model.fleet)
-    model = CaseModel(fleet, settings.model.housing, settings.model.conditions, helix=False)
-    cases = model.base.cases
+def _design_sweep(settings: BatchSettings, housing: HousingSound | None = None) -> SweepPart:
+    fleet = fleet_of(settings.fleet)
+    held = CaseModel(fleet, housing, settings.conditions, helix=False, integrate=False, keep=True)
+    cases = held.base.cases
     shape = (len(settings.points), len(cases))
     values = np.full((*shape, len(QUANTITIES)), math.nan)
     speeds = np.full(shape, math.nan)
     reasons = []
     for number, point in enumerate(settings.points):
+        tell_progress(number / len(settings.points))
         try:
-            found = model.values(fleet_at(fleet, point), _helix_deg(fleet, point))
+            found = held.values(_changed(fleet, point), _helix_deg(fleet, point), settings.integrate)
         except TdacousticError as error:
             reasons.append(reason_of(error))
             continue
         if [case.name for case in found.cases] != [case.name for case in cases]:
-            reasons.append("has other conditions than the fleet")
+            reasons.append(OTHER_CONDITIONS)
             continue
         values[number], speeds[number] = found.values, [case.value for case in found.cases]
         reasons.append("")
-        tell_progress((number + 1) / len(settings.points))
     return SweepPart(cases, speeds, values, tuple(reasons))
 
 
@@ -276,6 +203,7 @@ def assembled(
     conditions: Sequence[str],
     refused: Mapping[int, str],
     parts: Sequence[tuple[Sequence[int], SweepPart]],
+    whole: Sequence[str] = (),
 ) -> SweepResult:
     """Return a sweep from its parts.
 
@@ -287,17 +215,18 @@ def assembled(
         Points that never came to be computed, and why.
     parts : sequence of (sequence of int, SweepPart)
         Numbers of the points of each part.
+    whole : sequence of str
+        See `points_of`.
     """
-    points = points_of(sweep)
+    points = points_of(sweep, whole)
     shape = (len(points), len(conditions))
     values, speeds = np.full((*shape, len(QUANTITIES)), math.nan), np.full(shape, math.nan)
     reasons = [refused.get(number, "") for number in range(len(points))]
     for numbers, part in parts:
-        for place, number in enumerate(numbers):
-            values[number], speeds[number] = part.values[place], part.speed_km_h[place]
-            reasons[number] = part.reasons[place]
-    return SweepResult(sweep, points, tuple(conditions), speeds, values, tuple(reasons))
+        values[list(numbers)], speeds[list(numbers)] = part.values, part.speed_km_h
+        for number, reason in zip(numbers, part.reasons, strict=True):
+            reasons[number] = reason
+    return SweepResult(sweep, points, tuple(conditions), speeds, values, tuple(reasons), tuple(whole))
 
 
-SWEEP_GROUPS: Final = Step("design-sweep-groups", 1, _sweep_groups, "Housings of the points of a design sweep")
-DESIGN_SWEEP: Final = Step("design-sweep", 1, _design_sweep, "Predictions for points of a design sweep")
+DESIGN_SWEEP: Final = Step("design-sweep", 2, _design_sweep, "Predictions for points of a design sweep")

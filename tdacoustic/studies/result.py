@@ -8,6 +8,7 @@ from tdacoustic.studies.checks import FeatureCheck, ReferenceCheck
 from tdacoustic.studies.design_sweeps import SweepResult
 from tdacoustic.studies.responses import Responses
 from tdacoustic.studies.sensitivity import Sensitivity
+from tdacoustic.studies.sweep_sensitivity import SweepSensitivity
 
 __all__ = ["Studies"]
 
@@ -24,6 +25,8 @@ class Studies:
     references : tuple of ReferenceCheck
     features : tuple of FeatureCheck
     sweeps : tuple of SweepResult
+    sweep_sensitivities : tuple of SweepSensitivity
+        Of those sweeps that go over ranges.
     """
 
     responses: Responses | None = None
@@ -31,3 +34,4 @@ class Studies:
     references: tuple[ReferenceCheck, ...] = ()
     features: tuple[FeatureCheck, ...] = ()
     sweeps: tuple[SweepResult, ...] = ()
+    sweep_sensitivities: tuple[SweepSensitivity, ...] = ()

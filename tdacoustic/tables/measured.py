@@ -91,6 +91,8 @@ def _level_rows(campaign: Campaign, levels: ConditionLevels) -> Iterator[Row]:
             "laeq_db": known.level_db if known.weighting == "A" else None,
             "correction": "none",
             "si_unit": "Pa",
+            "distance_m": known.distance_m,
+            "role": "receiver",
         }
 
 

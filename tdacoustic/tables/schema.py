@@ -16,7 +16,8 @@ COLUMNS: Final = MappingProxyType(
     {
         "quality": "run channel check verdict detail",
         "levels": "run condition train_speed_km_h channel component quantity rms level_db reference laeq_db "
-        "background_db correction si_unit level_band_db level_band_from_hz level_band_to_hz calibration",
+        "background_db correction si_unit level_band_db level_band_from_hz level_band_to_hz calibration distance_m "
+        "role",
         "bands": "run condition channel band_hz level_db filter_dependent",
         "lines": "run condition channel component frequency_hz frequency_error_hz level_db prominence_db order "
         "family rms",
@@ -69,6 +70,8 @@ COLUMNS: Final = MappingProxyType(
         "sweep_points": "sweep point parameter value words reason",
         "sweeps": "sweep point condition train_speed_km_h parameters structure_spl_4m_db mesh_spl_4m_db "
         "motor_spl_4m_db spl_4m_db masuda_spl_1m_db dte_pp_um range_12m_db loudest_deg reason",
+        "sweep_sensitivity": "sweep parameter range_from range_to scale condition level_of measure value low high "
+        "explained explained_ranks n_used n_rattling n_silent n_refused",
         "orders": "run condition channel order speed_rpm level_db name kind shaft bandwidth_orders requested_bandwidth "
         "level_error_db floor_db phase_deg phase_error_deg steadiness method reason",
         "sidebands": "run condition channel carrier carrier_order spacing spacing_orders speed_rpm pairs sidebands_db "
@@ -105,6 +108,7 @@ TEXT_COLUMNS: Final = frozenset(
         *("order_name", "leading", "speed_source", "causes"),
         *("parameter", "parameters", "origin", "per", "not_varied", "kind", "model_condition", "sentence", "words"),
         *("feature", "over", "shape", "reason", "turned_by"),
+        *("scale", "level_of", "measure"),
         *(f"influence_{number}{of}" for number in "123" for of in ("", "_per")),
         *("mode", "method", "gear", "direction", "receiver", "path", "sweep"),
         *("coupling", "plane", "place", "case"),
@@ -116,7 +120,7 @@ TEXT_COLUMNS: Final = frozenset(
         *("sensor_dominant", "order_dominant", "contribution_dominant"),
         *("sensor", "calibrator", "sensitivity_stated", "sensitivity_set", "scale_from", "calibration"),
         *("calibrated_on", "due_on"),
-        *("log", "reference_log", "doubt"),
+        *("log", "reference_log", "doubt", "role"),
         *("evidence_agreement", "evidence_source", "evidence_words"),
     }
 )

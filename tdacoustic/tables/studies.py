@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 from tdacoustic.drive import Directivity, Prediction
 from tdacoustic.drive.patterns import pattern_of, pattern_pairs
@@ -15,11 +15,11 @@ from tdacoustic.studies import (
     ReferenceCheck,
     Sensitivity,
     Studies,
-    SweepResult,
 )
 from tdacoustic.studies.sensitivity import per_words
 from tdacoustic.studies.words import feature_words, reference_words
 from tdacoustic.tables.frames import Row, frame_of
+from tdacoustic.tables.sweeps import sweep_tables
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -27,13 +27,6 @@ if TYPE_CHECKING:
     from tdacoustic.fleet import Fleet
 
 __all__ = ["pattern_tables", "study_tables"]
-
-SWEPT = (
-    *("structure_spl_4m_db", "mesh_spl_4m_db", "motor_spl_4m_db", "spl_4m_db", "masuda_spl_1m_db", "dte_pp_um"),
-    *("range_12m_db", "loudest_deg"),
-)
-"""Quantities of a sweep's table."""
-
 
 _UNITS: Final = {"db": "dB", "um": "um", "n": "N", "hz": "Hz", "deg": "deg"}
 """Of a quantity, by the last part of its name."""
@@ -56,7 +49,7 @@ def pattern_tables(prediction: Prediction) -> dict[str, pd.DataFrame]:
 def study_tables(studies: Studies, fleet: Fleet) -> dict[str, pd.DataFrame]:
     """Return the tables of studies as frames, by name; those of what was not studied are left out.
 
-    ``sensitivity``, ``references``, ``features``, ``sweep_points`` and ``sweeps``.
+    ``sensitivity``, ``references``, ``features``, ``sweep_points``, ``sweeps`` and ``sweep_sensitivity``.
 
     Parameters
     ----------
@@ -71,10 +64,10 @@ def study_tables(studies: Studies, fleet: Fleet) -> dict[str, pd.DataFrame]:
         rows["references"] = (_reference_row(one, fleet) for one in studies.references)
     if studies.features:
         rows["features"] = (_feature_row(one, fleet) for one in studies.features)
+    tables = {name: frame_of(name, table) for name, table in rows.items()}
     if studies.sweeps:
-        rows["sweep_points"] = (row for sweep in studies.sweeps for row in _point_rows(sweep))
-        rows["sweeps"] = (row for sweep in studies.sweeps for row in _sweep_rows(sweep))
-    return {name: frame_of(name, table) for name, table in rows.items()}
+        tables |= sweep_tables(studies.sweeps, studies.sweep_sensitivities)
+    return tables
 
 
 def _known(value: float | None) -> float | None:
@@ -174,35 +167,3 @@ def _feature_row(check: FeatureCheck, fleet: Fleet) -> Row:
         "sentence": feature_words(check, fleet).text,
         "margin_unit": {"alike": "correlation", "toward": "deg"}.get(feature.shape, "dB"),
     }
-
-
-def _point_rows(found: SweepResult) -> Iterator[Row]:
-    for number, (point, reason) in enumerate(zip(found.points, found.reasons, strict=True), 1):
-        for key, value in point:
-            is_number = isinstance(value, int | float) and not isinstance(value, bool)
-            held: Row = {"value": float(value)} if is_number else {"words": _text(value)}
-            yield {"sweep": found.sweep.name, "point": float(number), "parameter": key, **held, "reason": reason}
-
-
-def _sweep_rows(found: SweepResult) -> Iterator[Row]:
-    for number, (point, reason) in enumerate(zip(found.points, found.reasons, strict=True)):
-        words = ", ".join(f"{key} = {_text(value)}" for key, value in point)
-        for place, condition in enumerate(found.conditions):
-            values = {name: _known(float(found.of(name)[number, place])) for name in SWEPT}
-            yield {
-                "sweep": found.sweep.name,
-                "point": float(number + 1),
-                "condition": condition,
-                "train_speed_km_h": _known(float(found.speed_km_h[number, place])),
-                "parameters": words,
-                **values,
-                "reason": reason,
-            }
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, tuple):
-        return f"[{', '.join(_text(one) for one in value)}]"
-    return f"{value:.9g}" if isinstance(value, int | float) else str(value)

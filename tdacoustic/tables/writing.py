@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["csv_cell", "csv_text"]
+__all__ = ["csv_cell", "csv_rows", "csv_text"]
 
 _FORMULA: Final = re.compile(r"(^|[;\r\n])(?=[=+\-@\t\r\n\uff1d\uff0b\uff0d\uff20])")
 """Where a spreadsheet begins a cell, before what it takes for a formula; half of the world's splits lines at ``;``."""
@@ -54,6 +57,21 @@ def csv_text(frame: pd.DataFrame) -> str:
         elif not pd.api.types.is_numeric_dtype(shown[column]):
             shown[column] = shown[column].map(_harmless, na_action="ignore")
     return shown.to_csv(index=False, lineterminator="\n", float_format="%.9g", na_rep="")
+
+
+def csv_rows(columns: Sequence[str], rows: Iterable[Sequence[str | int | None]]) -> str:
+    r"""Return rows as CSV by the rules of `csv_text`, without pandas.
+
+    Examples
+    --------
+    >>> csv_rows(["name", "n"], [["a", 1], ["=b", None]])
+    "name,n\na,1\n'=b,\n"
+    """
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    writer.writerows([_harmless(value) for value in row] for row in rows)
+    return text.getvalue()
 
 
 def _harmless(value: Any) -> Any:

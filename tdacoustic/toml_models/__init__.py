@@ -11,7 +11,7 @@ from tdacoustic.toml_models.messages import (
     shown,
 )
 from tdacoustic.toml_models.names import MAX_NAME_LENGTH, Name, legal_name, name_problem, unique_name
-from tdacoustic.toml_models.paths import PathText, path_problem, small_file
+from tdacoustic.toml_models.paths import PathText, address_problem, is_address, path_problem, small_file
 from tdacoustic.toml_models.reading import check_schema, file_or_inside, frozen, meta_lines, read_toml, steering_sign
 from tdacoustic.toml_models.values import NonNegative, Positive, Table, Text, each_once
 
@@ -26,11 +26,13 @@ __all__ = [
     "Table",
     "Text",
     "Vocabulary",
+    "address_problem",
     "check_schema",
     "each_once",
     "file_error",
     "file_or_inside",
     "frozen",
+    "is_address",
     "joined",
     "legal_name",
     "meta_lines",

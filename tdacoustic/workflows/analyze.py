@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import MissingFileError, TdacousticError
-from tdacoustic.steps import Store, default_store_path
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store, default_store_path
 
 if TYPE_CHECKING:
     from tdacoustic.attribution import ConditionEvidence, Dominance, RunEvidence, RunKinematics, SourceLine
@@ -31,11 +30,12 @@ PARALLEL_BYTES = 100 * 2**20
 def analyze(
     campaign: str | Path | Campaign,
     store: str | Path | Store | None = None,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
     *,
     without_runs: bool = False,
     deeper: bool = True,
+    fetch_urls: bool = False,
 ) -> Analysis:
     """Analyse the logs of a campaign.
 
@@ -44,13 +44,15 @@ def analyze(
     campaign : path or Campaign
     store : path or Store, optional
         Where results are kept; default `tdacoustic.steps.default_store_path`.
-    jobs : int, optional
+    jobs : int or Executor, optional
         Processes; default: one a core where the logs are large enough to pay.
     progress : callable, optional
     without_runs : bool
         Go on where no run can be used: for who has more to do than to analyse.
     deeper : bool
         Whether the second pass is made too: orders, tones, contributions.
+    fetch_urls : bool
+        Whether logs that the campaign names by URL may be fetched; they are kept in the store.
 
     Returns
     -------
@@ -61,9 +63,11 @@ def analyze(
     Raises
     ------
     TdacousticError
-        The campaign or its fleet is wrong, or (unless `without_runs`) no run can be used.
+        The campaign or its fleet is wrong, it names a URL that may not be fetched, or (unless `without_runs`) no run
+        can be used.
     """
     from tdacoustic.steps import execute, lineage, result_of
+    from tdacoustic.workflows.fetched_logs import with_fetched_logs
     from tdacoustic.workflows.groundwork import lay_groundwork
     from tdacoustic.workflows.order_tracking import order_problems
     from tdacoustic.workflows.run_speeds import check_speeds, speed_problems
@@ -72,8 +76,9 @@ def analyze(
 
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
+    campaign, not_fetched = with_fetched_logs(campaign, store, fetch_urls, progress)
     fleet, problems = _fleet(campaign)
-    ground = lay_groundwork(campaign, store, 1 if jobs is None else jobs, progress)
+    ground = lay_groundwork(campaign, store, 1 if jobs is None else jobs, progress).with_failed(not_fetched)
     prepared = prepare_runs(campaign, store, without_runs, ground)
     tasks = {item.run.name: item.task for item in prepared if item.task is not None}
     n_jobs = _jobs(prepared) if jobs is None else jobs

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Final
 
 from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import CampaignError, FittingError
-from tdacoustic.steps import Store, default_store_path
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store, default_store_path
 from tdacoustic.workflows.runs import fleet_input, written_inputs
 
 if TYPE_CHECKING:
@@ -30,9 +29,11 @@ MOST_OF_THE_SOUND: Final = 0.5
 def calibrate(
     campaign: str | Path | Campaign,
     store: str | Path | Store | None = None,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
     analysis: Analysis | None = None,
+    *,
+    fetch_urls: bool = False,
 ) -> CampaignCalibration:
     """Fit the parameters that ``[calibration]`` names to the measured levels of a campaign.
 
@@ -44,6 +45,8 @@ def calibrate(
         As of `tdacoustic.analyze`.
     analysis : Analysis, optional
         The campaign's measured side, where it is known already.
+    fetch_urls : bool
+        As of `tdacoustic.analyze`.
 
     Raises
     ------
@@ -72,8 +75,12 @@ def calibrate(
     fleet = load_fleet(campaign.fleet.path)
     checked_cases(campaign, fleet)
     if analysis is None and campaign.runs:
-        analysis = _analyzed(campaign, store, jobs, progress)
-    joint = joint_levels(campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress), store)
+        analysis = _analyzed(campaign, store, jobs, progress, fetch_urls)
+    if analysis is not None:
+        campaign = analysis.campaign  # which knows where its logs were fetched to
+    joint = joint_levels(
+        campaign, analysis, fleet, lambda other: _analyzed(other, store, jobs, progress, fetch_urls), store
+    )
     free, transferred, earlier = free_parameters(campaign, fleet, joint.campaigns)
     try:
         checked_free(fleet, [parameter.name for parameter in free])
@@ -147,7 +154,9 @@ def _over_speed(
     )
 
 
-def _analyzed(campaign: Campaign, store: Store, jobs: int | None, progress: Progress | None) -> Analysis:
+def _analyzed(
+    campaign: Campaign, store: Store, jobs: Jobs | None, progress: Progress | None, fetch_urls: bool
+) -> Analysis:
     from tdacoustic.workflows.analyze import analyze
 
-    return analyze(campaign, store, jobs, progress, deeper=False)
+    return analyze(campaign, store, jobs, progress, deeper=False, fetch_urls=fetch_urls)

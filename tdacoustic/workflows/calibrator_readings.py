@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from tdacoustic.measured.calibrator_step import CalibratorReadings
     from tdacoustic.recording import Channel, LogChannel
     from tdacoustic.sensors.calibrator_check import CalibratorCheck, CalibratorRun, ChannelScale
-    from tdacoustic.steps import Record, Store, Task
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store, Task
     from tdacoustic.workflows.clocks import CampaignClocks
     from tdacoustic.workflows.scanned_runs import ScannedRun
 
@@ -31,7 +30,7 @@ PASSING_S: Final = 0.5
 Scales = Mapping[str, Mapping[str, "KnownScale"]]
 """By run, then by channel."""
 
-Execution = tuple[int, "Progress | None"]
+Execution = tuple["Jobs", "Progress | None"]
 """Processes, and who is told of progress."""
 
 
@@ -78,7 +77,7 @@ def read_calibrators(
     scales : mapping of str to mapping of str to KnownScale
         From the sensor database, by run and channel.
     store : Store
-    execution : tuple of (int, callable or None)
+    execution : tuple of (int or Executor, callable or None)
         Processes and progress.
     """
     from tdacoustic.steps import execute, lineage, result_of
@@ -123,7 +122,7 @@ def _calibrator_run(run: CampaignRun, series: int) -> CalibratorRun:
 def _task(campaign: Campaign, item: ScannedRun, clocks: CampaignClocks, store: Store) -> Task | None:
     """The task that reads the tone in every channel that the calibrator may have been put on; None of no channel."""
     from tdacoustic.measured.calibrator_step import CALIBRATOR, CalibratorSettings
-    from tdacoustic.steps import log_file
+    from tdacoustic.workflows.fetched_logs import hashed_logs
 
     if _is_cut_nowhere(item, clocks):
         return None
@@ -132,7 +131,7 @@ def _task(campaign: Campaign, item: ScannedRun, clocks: CampaignClocks, store: S
     if not channels:
         return None
     wanted = _calibrator_run(item.run, 1).wanted_hz or tuple(sorted({*sum(USUAL_FREQUENCIES_HZ.values(), ())}))
-    logs = tuple(log_file(log.path, store, log.companions) for log in item.logs)
+    logs = hashed_logs(item.run, item.logs, store)
     return CALIBRATOR.task(f"run {item.run.name}", CalibratorSettings(channels, wanted), logs=logs)
 
 

@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
     from tdacoustic.sensors.calibrator_check import CalibratorCheck
     from tdacoustic.sensors.channel_calibration import ChannelCalibration
-    from tdacoustic.steps import Record, Store
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store
     from tdacoustic.workflows.calibrator_readings import Scales
     from tdacoustic.workflows.clocks import CampaignClocks
     from tdacoustic.workflows.scanned_runs import ScannedRun
@@ -28,7 +27,7 @@ def campaign_sensors(
     scanned: Sequence[ScannedRun],
     clocks: CampaignClocks,
     store: Store,
-    n_jobs: int | None = None,
+    n_jobs: Jobs | None = None,
     progress: Progress | None = None,
 ) -> tuple[CampaignSensors, Mapping[str, Record]]:
     """Find out the scales that do not stand in the campaign, and check those that do.
@@ -41,7 +40,7 @@ def campaign_sensors(
     clocks : CampaignClocks
         How the logs of its runs lie on one axis: calibrators are read on it.
     store : Store
-    n_jobs : int, optional
+    n_jobs : int or Executor, optional
         Processes; default 1.
     progress : callable, optional
 

@@ -17,8 +17,7 @@ from tdacoustic.workflows.shared_clocks import clocks_by_signal, shared_tasks, s
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
-    from tdacoustic.steps import Record
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record
     from tdacoustic.workflows.scanned_runs import ScannedRun
 
 __all__ = ["CampaignClocks", "campaign_clocks"]
@@ -50,7 +49,7 @@ def campaign_clocks(
     campaign: Campaign,
     scanned: Sequence[ScannedRun],
     store: Store,
-    n_jobs: int | None = None,
+    n_jobs: Jobs | None = None,
     progress: Progress | None = None,
 ) -> CampaignClocks:
     """Find the clocks of each run of several logs; one that cannot be had does not stop the others.
@@ -61,7 +60,7 @@ def campaign_clocks(
     scanned : sequence of ScannedRun
         Its valid runs.
     store : Store
-    n_jobs : int, optional
+    n_jobs : int or Executor, optional
         Processes; default 1.
     progress : callable, optional
     """

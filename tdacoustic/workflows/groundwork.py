@@ -7,7 +7,7 @@ nothing. Clocks come first, as a calibrator run of several logs is read on its o
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from tdacoustic.errors import TdacousticError
@@ -16,8 +16,7 @@ from tdacoustic.measured.run_sensors import CampaignSensors
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
-    from tdacoustic.steps import Record, Store
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store
     from tdacoustic.workflows.scanned_runs import ScannedRun
 
 __all__ = ["Groundwork", "lay_groundwork"]
@@ -47,9 +46,13 @@ class Groundwork:
     sensors: CampaignSensors = field(default_factory=CampaignSensors)
     scanned: tuple[ScannedRun, ...] = ()
 
+    def with_failed(self, failed: Mapping[str, TdacousticError]) -> Groundwork:
+        """Return it with further runs that cannot be used."""
+        return replace(self, failed={**self.failed, **failed})
+
 
 def lay_groundwork(
-    campaign: Campaign, store: Store, n_jobs: int | None = None, progress: Progress | None = None
+    campaign: Campaign, store: Store, n_jobs: Jobs | None = None, progress: Progress | None = None
 ) -> Groundwork:
     """Find out what binding the campaign's channels rests on.
 
@@ -57,7 +60,7 @@ def lay_groundwork(
     ----------
     campaign : Campaign
     store : Store
-    n_jobs : int, optional
+    n_jobs : int or Executor, optional
         Processes; default 1.
     progress : callable, optional
 

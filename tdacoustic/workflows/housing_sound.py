@@ -7,8 +7,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from tdacoustic.errors import FleetError, RadiationError
-from tdacoustic.steps import Store
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store
 
 if TYPE_CHECKING:
     from tdacoustic.drive import HousingSound, Receiver
@@ -25,7 +24,7 @@ _MOST_BYTES: Final = 12e9
 def housing_sound(
     fleet: Fleet,
     store: Store,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
     receivers: Sequence[Receiver] = (),
 ) -> tuple[HousingSound | None, tuple[tuple[str, Record], ...]]:
@@ -35,7 +34,7 @@ def housing_sound(
     ----------
     fleet : Fleet
     store : Store
-    jobs : int, optional
+    jobs : int or Executor, optional
         Processes side by side; default one a core.
     progress : callable, optional
     receivers : sequence of Receiver

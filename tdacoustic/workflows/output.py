@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import glob
 import hashlib
 import json
 import os
 import platform
 import shutil
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -17,7 +17,15 @@ from uuid import uuid4
 
 from tdacoustic.errors import OutputError, TdacousticError
 
-__all__ = ["MANIFEST", "OutputFolder", "default_output"]
+__all__ = [
+    "MANIFEST",
+    "OutputFolder",
+    "default_output",
+    "partial_name",
+    "read_manifest",
+    "subject_of",
+    "sweep_left_overs",
+]
 
 MANIFEST = "manifest.json"
 SCHEMA = "tdacoustic-manifest/1"
@@ -46,16 +54,50 @@ def _is_left_over(folder: Path, mark: str) -> bool:
     return time.time() - folder.stat().st_mtime > _LEFT_OVER_S
 
 
+def partial_name(name: str) -> str:
+    """Return the name under which a file or folder is written before it is moved into place beside itself."""
+    return f".{name}.{_staging_mark()}.partial"
+
+
+def sweep_left_overs(parent: Path, names: Collection[str]) -> None:
+    """Take away what killed runs left beside their results; not what another run is writing at this moment.
+
+    Parameters
+    ----------
+    parent : Path
+        The folder that the results are in; it need not exist.
+    names : collection of str
+        Of these result folders and files.
+    """
+    for left in parent.glob(".*.partial"):
+        name, _, mark = left.name[1:].removesuffix(".partial").rpartition(".")
+        with suppress(OSError):  # somebody else takes it away
+            if name in names and _is_left_over(left, mark):
+                left.unlink() if left.is_file() else shutil.rmtree(left, ignore_errors=True)
+
+
 def default_output(toml_file: Path) -> Path:
     """Return ``reports/<name of the folder the TOML is in>`` below the working directory."""
     return Path("reports") / toml_file.resolve().parent.name
 
 
-def _relative(path: Path, start: Path) -> str:
+def subject_of(subject: Path, folder: Path) -> str:
+    """Return what the manifest of a result folder calls the file that its results are of: its path from there."""
     try:
-        return Path(os.path.relpath(path.resolve(), start.resolve())).as_posix()
+        return Path(os.path.relpath(subject.resolve(), folder.resolve())).as_posix()
     except ValueError:  # another drive
-        return path.resolve().as_posix()
+        return subject.resolve().as_posix()
+
+
+def read_manifest(folder: Path) -> dict[str, Any] | None:
+    """Return the manifest of a result folder, complete or not; None where there is none of tdacoustic."""
+    try:
+        held = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return None
+    if not isinstance(held, dict) or not str(held.get("schema", "")).startswith("tdacoustic-manifest/"):
+        return None
+    return held if isinstance(held.get("files"), dict) else {**held, "files": {}}
 
 
 class OutputFolder:
@@ -71,9 +113,9 @@ class OutputFolder:
     ----------
     path : Path
     subject : Path
-        The campaign or fleet file that the results are of. A folder whose
-        manifest names the same subject is refreshed; anything else in the way
-        is refused.
+        The campaign or fleet file that the results are of; of a view of many
+        results the folder that they are all in. A folder whose manifest names
+        the same subject is refreshed; anything else in the way is refused.
     overwrite : bool
         Write over whatever is there; foreign files of other names stay.
     keep : bool
@@ -88,9 +130,10 @@ class OutputFolder:
     def __init__(self, path: Path, subject: Path, overwrite: bool = False, keep: bool = False) -> None:
         self.path = path
         whole = path.absolute() if path.name not in ("", "..") else path.resolve()  # "." and ".." name no folder
-        self.staging = whole.with_name(f".{whole.name}.{_staging_mark()}.partial")
+        self._name = whole.name
+        self.staging = whole.with_name(partial_name(whole.name))
         self.manifest: dict[str, Any] = {}
-        self._subject = _relative(subject, path)
+        self._subject = subject_of(subject, path)
         self._overwrite = overwrite
         self._keep = keep
         try:
@@ -103,7 +146,7 @@ class OutputFolder:
             raise OutputError(f"{self.path}: a file is in the way of the output folder")
         if self._overwrite or not self.path.is_dir() or not any(self.path.iterdir()):
             return
-        held = self._old_manifest()
+        held = read_manifest(self.path)
         if held is None:
             raise OutputError(f"{self.path}: the folder is not empty and not a result of tdacoustic; give --overwrite")
         if held.get("subject") != self._subject:
@@ -112,30 +155,13 @@ class OutputFolder:
                 "give --overwrite or another -o"
             )
 
-    def _old_manifest(self) -> dict[str, Any] | None:
-        try:
-            held = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return None
-        if not isinstance(held, dict) or not str(held.get("schema", "")).startswith("tdacoustic-manifest/"):
-            return None
-        return held if isinstance(held.get("files"), dict) else {**held, "files": {}}
-
     def __enter__(self) -> OutputFolder:
         try:
-            self._sweep()
+            sweep_left_overs(self.staging.parent, {self._name})
             self.staging.mkdir(parents=True)
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror})") from error
         return self
-
-    def _sweep(self) -> None:
-        """Take away what killed runs left beside the target; not what another run is writing at this moment."""
-        name, _ = self.staging.name.removesuffix(".partial").rsplit(".", 1)
-        for left in self.staging.parent.glob(f"{glob.escape(name)}.*.partial"):
-            mark = left.name[len(name) + 1 :].removesuffix(".partial")
-            if "." not in mark and _is_left_over(left, mark):
-                shutil.rmtree(left, ignore_errors=True)
 
     def write_text(self, name: str, text: str) -> None:
         """Write one file of the result."""
@@ -159,7 +185,7 @@ class OutputFolder:
     def _publish(self) -> None:
         names = sorted(p.relative_to(self.staging).as_posix() for p in self.staging.rglob("*") if p.is_file())
         files = {name: _sha256(self.staging / name) for name in names}
-        old = self._old_manifest() or {}
+        old = read_manifest(self.path) or {}
         if self._keep and old.get("complete") and old.get("subject") == self._subject:
             self.manifest = {key: value for key, value in old.items() if key not in ("schema", "subject", "complete")}
             files = {**old["files"], **files}

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 
 from tdacoustic.errors import FleetError, TdacousticError
 from tdacoustic.fleet import Fleet, load_fleet
-from tdacoustic.steps import Store, default_store_path, log_file
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store, default_store_path, log_file
 
 if TYPE_CHECKING:
     from tdacoustic.drive import Condition, DriveModel, Receiver, SpeedSweep
@@ -27,7 +26,7 @@ def predict(
     progress: Progress | None = None,
     conditions: Iterable[Condition] | None = None,
     receivers: Sequence[Receiver] = (),
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     what_if: WhatIfAnswer | None = None,
 ) -> FleetPrediction:
     """Compute the model of a fleet over its ``[operation]``, or over other conditions.
@@ -44,7 +43,7 @@ def predict(
         missing the sweep is left out, and a doubt says so.
     receivers : sequence of Receiver
         Where levels are wanted besides the 4 m surface.
-    jobs : int, optional
+    jobs : int or Executor, optional
         Processes for transfer vectors that are not there yet; default one a core.
     what_if : WhatIfAnswer, optional
         What changes do to the levels of this fleet in these conditions at these receivers, where it is known already.

@@ -11,13 +11,13 @@ from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import (
     AnalysisError,
     CampaignError,
+    ExecutorError,
     FormatError,
     MissingFileError,
     StoreError,
     TdacousticError,
 )
-from tdacoustic.steps import Store, default_store_path
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store, default_store_path
 
 if TYPE_CHECKING:
     from tdacoustic.drive.what_if import WhatIfAnswer
@@ -37,8 +37,10 @@ T = TypeVar("T")
 def run(
     campaign: str | Path | Campaign,
     store: str | Path | Store | None = None,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
+    *,
+    fetch_urls: bool = False,
 ) -> CampaignResult:
     """Do all that can be done for a campaign: analyse its logs, calibrate its fleet to them, predict with that.
 
@@ -49,7 +51,7 @@ def run(
     Parameters
     ----------
     campaign : path or Campaign
-    store, jobs, progress
+    store, jobs, progress, fetch_urls
         As of `tdacoustic.analyze`.
 
     Returns
@@ -72,13 +74,15 @@ def run(
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     if campaign.fleet is not None and campaign.fleet.path.is_file():  # one that is not there is told by the analysis
         checked_cases(campaign, load_fleet(campaign.fleet.path))
-    analysis, lost = _measured_side(campaign, store, jobs, progress)
-    fleet = analysis.fleet
+    analysis, lost = _measured_side(campaign, store, jobs, progress, fetch_urls)
+    campaign, fleet = analysis.campaign, analysis.fleet
     if fleet is None:
         if lost is not None:
             raise lost
         return CampaignResult(campaign, analysis, None, None, (NO_FLEET,))
-    calibration, unfitted = _tried(lambda: calibrate(campaign, store, jobs, progress, analysis=analysis))
+    calibration, unfitted = _tried(
+        lambda: calibrate(campaign, store, jobs, progress, analysis=analysis, fetch_urls=fetch_urls)
+    )
     used = fleet if calibration is None else calibration.calibration.fleet
     answer = None if calibration is None else calibration.what_if
     prediction, unpredicted = _tried(lambda: _predicted(campaign, analysis, used, store, jobs, progress, answer))
@@ -89,22 +93,22 @@ def run(
 
 
 def _measured_side(
-    campaign: Campaign, store: Store, jobs: int | None, progress: Progress | None
+    campaign: Campaign, store: Store, jobs: Jobs | None, progress: Progress | None, fetch_urls: bool
 ) -> tuple[Analysis, TdacousticError | None]:
     """The analysis; where no run can be used an empty one, and why."""
     from tdacoustic.workflows.analyze import analyze
 
     try:
-        return analyze(campaign, store, jobs, progress), None
+        return analyze(campaign, store, jobs, progress, fetch_urls=fetch_urls), None
     except _LOGS_FAIL as error:
-        return analyze(campaign, store, jobs, progress, without_runs=True), error
+        return analyze(campaign, store, jobs, progress, without_runs=True, fetch_urls=fetch_urls), error
 
 
 def _tried(task: Callable[[], T]) -> tuple[T | None, TdacousticError | None]:
-    """A result, or why there is none; an error of the campaign's file or of the store ends the run."""
+    """A result, or why there is none; an error of the campaign's file, the store or a cluster ends the run."""
     try:
         return task(), None
-    except (CampaignError, StoreError):
+    except (CampaignError, ExecutorError, StoreError):
         raise
     except TdacousticError as error:
         return None, error
@@ -115,7 +119,7 @@ def _predicted(
     analysis: Analysis,
     fleet: Fleet,
     store: Store,
-    jobs: int | None,
+    jobs: Jobs | None,
     progress: Progress | None,
     answer: WhatIfAnswer | None,
 ) -> FleetPrediction:

@@ -17,6 +17,7 @@ from tdacoustic.quality import Verdict
 from tdacoustic.recording import Channel, Log, Recording
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+from tdacoustic.workflows.fetched_logs import hashed_logs
 from tdacoustic.workflows.groundwork import Groundwork, lay_groundwork
 from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
 
@@ -128,10 +129,10 @@ def _prepare(
     """Hash a run's logs, bind its channels, make its task."""
     run = item.run
     if item.error is not None:
-        return PreparedRun(run, error=item.error)
+        return PreparedRun(run, error=ground.failed.get(run.name, item.error))
     logs: tuple[LogFile, ...] = ()
     try:
-        logs = tuple(log_file(log.path, store, log.companions) for log in item.logs)
+        logs = hashed_logs(run, item.logs, store)
         if run.name in ground.failed:
             raise ground.failed[run.name]
         clocks = ground.clocks.get(run.name)

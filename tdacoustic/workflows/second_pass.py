@@ -13,8 +13,7 @@ if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
     from tdacoustic.fleet import Fleet, Kinematics
     from tdacoustic.measured.runs import MeasuredRun
-    from tdacoustic.steps import Record, Store, Task
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record, Store, Task
     from tdacoustic.workflows.runs import PreparedRun
 
 __all__ = ["FirstPass", "SecondPass", "second_pass"]
@@ -138,14 +137,14 @@ WHOLE_KINDS: Final[Mapping[str, Callable[[FirstPass, Mapping[str, RunTasks]], Ta
 """What makes the task of the whole campaign of each kind, of the tasks of its runs, by kind, that could be computed."""
 
 
-def second_pass(first: FirstPass, store: Store, jobs: int, progress: Progress | None) -> SecondPass:
+def second_pass(first: FirstPass, store: Store, jobs: Jobs, progress: Progress | None) -> SecondPass:
     """Compute what rests on the runs' measurements; what fails of one run stops nothing else.
 
     Parameters
     ----------
     first : FirstPass
     store : Store
-    jobs : int
+    jobs : int or Executor
     progress : callable or None
     """
     tasks = {kind: make(first) for kind, make in KINDS.items()}

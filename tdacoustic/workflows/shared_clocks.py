@@ -12,12 +12,12 @@ from tdacoustic.ingest.stamps import late_s
 from tdacoustic.measured.clock_step import CLOCK, ClockFinding, ClockSettings, SharedChannel
 from tdacoustic.measured.run_clocks import LogClock, RunClocks
 from tdacoustic.quality import Verdict
-from tdacoustic.steps import Store, Task, execute, lineage, log_file, result_of
+from tdacoustic.steps import Store, Task, execute, lineage, result_of
+from tdacoustic.workflows.fetched_logs import hashed_logs
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
-    from tdacoustic.steps import Record
-    from tdacoustic.steps.execution import Progress
+    from tdacoustic.steps import Jobs, Progress, Record
     from tdacoustic.workflows.several_logs import SeveralLogs
 
 __all__ = ["clocks_by_signal", "shared_tasks", "sought_clocks"]
@@ -50,8 +50,8 @@ def shared_tasks(campaign: Campaign, several: SeveralLogs, store: Store) -> dict
         settings = ClockSettings(
             columns[reference], columns[index], run.max_offset_s, centre_s if run.max_offset_s is not None else 0.0
         )
-        files = [log_file(several.logs[i].path, store, several.logs[i].companions) for i in (reference, index)]
-        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=tuple(files))
+        logs = hashed_logs(run, several.logs, store)
+        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=(logs[reference], logs[index]))
     return found
 
 
@@ -85,7 +85,7 @@ def _column(campaign: Campaign, several: SeveralLogs, index: int) -> SharedChann
 
 
 def sought_clocks(
-    tasks: Mapping[str, Mapping[int, Task]], store: Store, n_jobs: int, progress: Progress | None
+    tasks: Mapping[str, Mapping[int, Task]], store: Store, n_jobs: Jobs, progress: Progress | None
 ) -> tuple[dict[str, dict[int, ClockFinding]], dict[str, TdacousticError], dict[str, Record]]:
     """Return what the search of a shared signal finds by run and log, which runs it fails for, and its records.
 
@@ -94,7 +94,7 @@ def sought_clocks(
     tasks : mapping of str to mapping of int to Task
         By run, as `shared_tasks` gives them.
     store : Store
-    n_jobs : int
+    n_jobs : int or Executor
     progress : callable or None
     """
     every = [task for of_run in tasks.values() for task in of_run.values()]

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeAlias
 
-from tdacoustic.steps import Store
-from tdacoustic.steps.execution import Progress
+from tdacoustic.steps import Jobs, Progress, Store
 
 if TYPE_CHECKING:
     from tdacoustic.campaign import Campaign
@@ -63,7 +62,7 @@ def predicted_what_if(
     receivers: Sequence[Receiver],
     store: Store,
     housing: HousingSound | None = None,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
 ) -> tuple[WhatIfAnswer, Records]:
     """Return what the cases of a fleet do to its levels, without intervals, and the records of the steps behind it.
@@ -103,7 +102,7 @@ def calibrated_what_if(
     calibration: Calibration,
     model: LevelModel,
     store: Store,
-    jobs: int | None = None,
+    jobs: Jobs | None = None,
     progress: Progress | None = None,
 ) -> tuple[WhatIfAnswer | None, Records]:
     """Return what the cases of a calibrated fleet do to its levels, with intervals; None without any condition.
@@ -158,7 +157,7 @@ def _changed(
     housing: HousingSound | None,
     receivers: Sequence[Receiver],
     store: Store,
-    jobs: int | None,
+    jobs: Jobs | None,
     progress: Progress | None,
 ) -> tuple[Mapping[str, DriveModel], Mapping[str, HousingSound | None], Records]:
     """Models and housings of the cases with other parameters, by name, and the records of the housings' steps."""

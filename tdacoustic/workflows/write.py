@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tdacoustic.workflows.named import named
 from tdacoustic.workflows.output import OutputFolder
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
     from tdacoustic.steps import Record
     from tdacoustic.tables.prediction_file import ModelArrays
+    from tdacoustic.workflows.made_from import FilesRead
 
 __all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction", "write_run"]
 
@@ -93,7 +95,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
         _write_report(folder, calibration_report(result))
         folder.manifest = {
             "command": "calibrate",
-            "campaign": _named(result.campaign),
+            "campaign": named(result.campaign, result.analysis),
             "fleet": {"name": result.fleet.name},
             "inputs": _inputs(result.inputs),
             "versions": result.versions,
@@ -101,7 +103,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
         }
 
 
-def write_run(result: CampaignResult, folder: OutputFolder) -> None:
+def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | None = None) -> None:
     """Write the files of analysis, calibration and prediction into one output folder, with one report.
 
     Parameters
@@ -109,8 +111,11 @@ def write_run(result: CampaignResult, folder: OutputFolder) -> None:
     result : CampaignResult
     folder : OutputFolder
         Not entered yet.
+    read : FilesRead, optional
+        Which files the run read; the manifest then tells a later run whether the result still holds.
     """
     from tdacoustic.reporting.run_report import run_report
+    from tdacoustic.workflows.made_from import counts_of
 
     analysis, prediction = result.analysis, result.prediction
     with folder:
@@ -129,6 +134,8 @@ def write_run(result: CampaignResult, folder: OutputFolder) -> None:
             "settings": result.settings,
             "steps": _steps(result.records),
             "problems": [*result.problems, *result.doubts],
+            "counts": counts_of(result.campaign),
+            "made_from": None if read is None else read.made_from(result.inputs),
         }
 
 
@@ -185,17 +192,13 @@ def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:
     """Return what the manifest says besides its files."""
     return {
         "command": command,
-        "campaign": _named(analysis.campaign),
+        "campaign": named(analysis.campaign, analysis),
         "inputs": _inputs(analysis.inputs),
         "settings": {key: list(v) if isinstance(v, tuple) else v for key, v in analysis.settings.items()},
         "steps": _steps(analysis.records),
         "versions": analysis.versions,
         "problems": list(analysis.problems),
     }
-
-
-def _named(campaign: Campaign) -> dict[str, str]:
-    return {"name": campaign.name, "origin": campaign.origin}
 
 
 def _inputs(files: Sequence[LogInput]) -> list[dict[str, Any]]:

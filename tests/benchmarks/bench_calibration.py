@@ -45,6 +45,7 @@ sys.path[:0] = [str(TESTS / "evidence"), str(TESTS / "gears")]
 
 import drive_levels as plain
 from calibration_study import BEARINGS, CONSTANT, DAMPING, GAIN, Truth
+from figures import note
 from printed_equations import direction, rates
 
 import tdacoustic as td
@@ -247,6 +248,11 @@ def against_rk45(repeats: int, levels_db: Sequence[float]) -> None:
         f"{n_ours} dampings | | {n_ours * rk45 / whole:.0f} |",
         flush=True,
     )
+    note("levels of six conditions from the gears", 1e3 * forward, "ms", "the same by RK45, same error", 1e3 * rk45)
+    note(
+        "calibration, two parameters on six conditions", whole, "s", "one least_squares on RK45", plain_fit, budget=0.5
+    )
+    note("one plain fit with the program's levels", same, "s", "the same fit on RK45", plain_fit)
 
 
 def growth(repeats: int) -> None:
@@ -273,6 +279,7 @@ def prediction(repeats: int) -> None:
     taken = timed(lambda: td.DriveModel(fleet).evaluate(), 3 * repeats)
     number = len(td.DriveModel(fleet).conditions)
     print(f"\n| prediction of {number} speeds and {len(helix)} helix angles (budget 0.1) | {taken:.3f} s |\n|---|---|")
+    note(f"prediction of {number} speeds and {len(helix)} helix angles", taken, "s", budget=0.1)
 
 
 def _short(key: str) -> str:

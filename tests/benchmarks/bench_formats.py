@@ -39,6 +39,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests" / "formats")]
 
+from figures import note
+
 RATE_HZ, CHANNELS = 51200, 4
 BLOCK_BYTES = 8 * 2**20
 PIECE = 1 << 18
@@ -413,6 +415,8 @@ def main(megabytes: float = 100.0, repeats: int = 5, *only: str) -> None:
                 print(f"{contest.name:14} not measured: {error}", flush=True)
                 continue
         ours, theirs, ratio, spread, own, other, how = cells
+        ends = [float(ratio), *(float(end) for end in spread.split(" to "))]
+        note(f"reading {contest.name}", float(ours), "MB/s", library, float(theirs), ends)
         print(f"{contest.name:14} {library:>18} {ours:>10} {theirs:>8} {ratio:>6} {spread:>20}", end="")
         print(f"{own:>34} {other:>12}  {how}", flush=True)
     print("\nratio: our speed over the library's; above 1 we are the faster")

@@ -34,6 +34,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "gears"))
 
+from figures import note
 from reference_drive import RATED_TORQUE_N_M, reference_system
 
 from tdacoustic.gears import GearSystem, SteadyState, steady_state
@@ -189,6 +190,10 @@ def against_scipy(cases: list[Case], repeats: int) -> None:
         off = float(case.errors_of(settled.displacement_m[0]))
         row = f"{1e3 * taken:.1f} | {off:.1e} | {settled.periods} | | {ratios(taken, bare, whole)}"
         print(f"| | our integration, compiled | {row} |")
+        if bare is not None:
+            note(f"gears, {case.name}: steady state in contact", 1e3 * bare, "ms", budget=1.0)
+        kind = "with multipliers" if bare is not None else "teeth separate"
+        budget = 2.0 if bare is not None else 30.0
         for method in ("RK45", "LSODA"):
             found = cheapest(case, method, error)
             if found is None:
@@ -197,6 +202,9 @@ def against_scipy(cases: list[Case], repeats: int) -> None:
             taken, off, periods, tolerance = found
             row = f"{1e3 * taken:.0f} | {off:.1e} | {periods} | {tolerance:g} | {ratios(taken, bare, whole)}"
             print(f"| | scipy {method} | {row} |", flush=True)
+            name = f"gears, {case.name}: steady state, {kind}"
+            against = f"scipy {method}, same error"
+            note(name, 1e3 * whole, "ms", against, 1e3 * taken, budget=budget)
 
 
 def ratios(taken: float, bare: float | None, whole: float) -> str:

@@ -20,6 +20,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+from figures import note
 from threadpoolctl import threadpool_limits
 
 import tdacoustic as td
@@ -103,6 +104,12 @@ def main() -> None:
             fast_total, slow_total = fast_total + fast, slow_total + slow
     print(f"six speeds and four helix angles, gears and all tables' numbers included: {1e3 * evaluation:.0f} ms")
     print(f"online, ten cases: {slow_total:.1f} s / {1e3 * fast_total:.1f} ms = {slow_total / fast_total:.0f} times")
+    direct = "direct boundary elements, the same grid"
+    note("housing's sound by transfer vectors, ten cases", 1e3 * fast_total, "ms", direct, 1e3 * slow_total)
+    top = f"to {options.highest_hz:g} Hz"
+    budget = {1500.0: 60.0, 3000.0: 300.0}.get(options.highest_hz)
+    note(f"the same with the one-off, {top}", once + evaluation, "s", direct, slow_total)
+    note(f"one-off: modes and transfer vectors {top}, from an empty store", once, "s", budget=budget)
     print(
         f"end to end, ten cases with the one-off: {slow_total:.1f} s / {once + evaluation:.1f} s = "
         f"{slow_total / (once + evaluation):.2f} times (modes are on the right side alone)"

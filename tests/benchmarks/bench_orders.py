@@ -34,6 +34,7 @@ TESTS = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(TESTS), str(TESTS / "recording")]
 
 from array_recording import recording_of
+from figures import note
 from made_up_run_ups import RunUp, db
 
 from tdacoustic.fleet import Kinematics, load_fleet
@@ -170,7 +171,7 @@ def main(seconds: float = 60.0, repeats: int = 5) -> None:
                 if repeat:  # the first round warms caches and compiles
                     times[name].append(time.perf_counter() - start)
         print(f"{channels} channels x {length:g} s at {rate_hz:g} Hz, 10 to 50 turns/s; median of {repeats} rounds")
-        report(times, channels * length)
+        report(times, channels * length, f"{channels} channels at {run.rate_hz:g} Hz")
         if rate_hz < 10000.0:
             print_errors(run, samples)
     budget(seconds, repeats)
@@ -206,6 +207,8 @@ def budget(seconds: float, repeats: int) -> None:
         times["both: the budget is 100"] = [sum(pair) for pair in zip(*times.values(), strict=True)]
         print(f"{channels} channels x {seconds:g} s at {run.rate_hz:g} Hz, {len(orders)} orders of a fleet")
         report(times, channels * seconds)
+        both = channels * seconds / statistics.median(times["both: the budget is 100"])
+        note(f"survey and orders of a run-up, {channels} channels at 51.2 kHz", both, "x real time", budget=100.0)
 
 
 def orders_of(settings: OrderSettings, recording: Any, speed: RunSpeed) -> Any:
@@ -218,7 +221,7 @@ def orders_of(settings: OrderSettings, recording: Any, speed: RunSpeed) -> Any:
     return run_orders(settings, (Log(),), speed)  # type: ignore[arg-type]
 
 
-def report(times: dict[str, list[float]], channel_seconds: float) -> None:
+def report(times: dict[str, list[float]], channel_seconds: float, noted: str = "") -> None:
     print(f"{'':42} {'s':>8} {'x real time a channel':>22} {'rota over ours':>15}")
     for name, values in times.items():
         median = statistics.median(values)
@@ -227,6 +230,9 @@ def report(times: dict[str, list[float]], channel_seconds: float) -> None:
         if name.startswith("ours") and rival in times and "cuts" not in name:
             ratios = [other / own for own, other in zip(values, times[rival], strict=True)]
             ratio = f"{statistics.median(ratios):.1f}"
+            if noted:
+                what = f"{name.removeprefix('ours: ')}, {noted}"
+                note(what, median, "s", "rota-order", statistics.median(times[rival]), ratios)
         print(f"{name:42} {median:8.3f} {channel_seconds / median:22.0f} {ratio:>15}")
     print()
 

@@ -36,6 +36,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evidence"))
 
 import radiation_study as study
+from figures import note
 from radiation_cases import BOX_M, FAR, HALF_WAVES, IMPEDANCE_PA_S_M, PANELS, Case, plate, receivers
 
 from tdacoustic.radiation.boundary_elements import ExteriorProblem
@@ -134,6 +135,8 @@ def against_other_codes(repeats: int) -> None:
                     print(f"| ours, {'with' if planes else 'no'} mirror planes: no grid here is as good | | | | |")
                 else:
                     print(equal.row(f"{other.seconds / equal.seconds:.0f}"), flush=True)
+                    what = f"boundary elements, {case.name}, {'with' if planes else 'no'} mirror planes"
+                    note(what, equal.seconds, "s", f"{other.what}, error {other.error_percent:.1f} %", other.seconds)
 
 
 def our_grids(case: Case, truth: np.ndarray, planes: tuple[Any, ...], repeats: int) -> list[Timed]:

@@ -28,6 +28,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import scipy.fft
+from figures import note
 from scipy import signal
 
 from tdacoustic.formats import scan
@@ -129,6 +130,22 @@ def main(seconds: float = 60.0, repeats: int = 5) -> None:
         spread = f"{min(ratios):.2f} to {max(ratios):.2f}"
         faster = CHANNELS * seconds / median
         print(f"{name:46} {median:7.3f} {statistics.median(ratios):9.2f} {spread:>20} {faster:22.0f}")
+    _note(times, seconds)
+
+
+def _note(times: dict[str, list[float]], seconds: float) -> None:
+    """Note what stands against scipy and librosa, and against the budgets."""
+    ours = times["ours: spectra and lines"]
+    for rival in ("reading + scipy.signal.welch", "reading + librosa.stft, mean of squares"):
+        ratios = [theirs / own for own, theirs in zip(ours, times[rival], strict=True)]
+        theirs = statistics.median(times[rival])
+        note("spectra and lines, 4 channels at 51.2 kHz", statistics.median(ours), "s", rival, theirs, ratios)
+    bare = statistics.median(times["reading + one bare rfft a frame"])
+    budget = 1.5 * bare
+    what = "the same; the budget is 1.5 times reading and one bare FFT pass"
+    note(what, statistics.median(ours), "s", "reading + one bare rfft a frame", bare, budget=budget)
+    banded = CHANNELS * seconds / statistics.median(times["ours: survey with bands"])
+    note("survey with third octaves, 4 channels at 51.2 kHz", banded, "x real time")
 
 
 if __name__ == "__main__":

@@ -10,9 +10,10 @@ import pytest
 from tdacoustic.campaign import load_campaign
 from tdacoustic.errors import CampaignError, FleetError, MissingFileError, TdacousticError
 from tdacoustic.fleet import load_fleet
-from tdacoustic.toml_models import path_problem
+from tdacoustic.toml_models import address_problem, is_address, path_problem
 
 HEAD = 'schema = "tdacoustic-campaign/1"\norigin = "measured"\n'
+MIC = '[[channel]]\nname = "mic"\ncomponent = "air"\n'
 RUN = '[[run]]\ncondition = "1"\nlogs = [{}]\n'
 
 FINE = [
@@ -60,13 +61,58 @@ def test_every_path_of_a_campaign_keeps_the_rule(tmp_path, text):
         "prior_fleet": HEAD + RUN.format("'a.wav'") + f"[calibration]\nprior_fleet = {quoted}\n",
         "with_campaigns": HEAD + RUN.format("'a.wav'") + f"[calibration]\nwith_campaigns = [{quoted}]\n",
     }
+    if is_address(text):
+        del files["logs"]  # a log may be named by one
     for key, content in files.items():
         (tmp_path / "campaign.toml").write_text(content, encoding="utf-8")
         with pytest.raises(CampaignError, match=rf"{key}.*must be a path"):
             load_campaign(tmp_path)
+    if is_address(text):
+        return
     (tmp_path / "campaign.toml").write_text(HEAD + "runs = 'runs.csv'\n", encoding="utf-8")
     (tmp_path / "runs.csv").write_text(f'condition,logs\n1,"{text}"\n', encoding="utf-8")
     with pytest.raises(CampaignError, match="logs"):
+        load_campaign(tmp_path)
+
+
+@pytest.mark.parametrize(
+    "text", ["s3://bucket/a.h5", "https://example.com:8080/a.h5?version=2", "file:///data/a.h5", "sftp://me@host/a.h5"]
+)
+def test_a_log_may_be_named_by_an_address_and_is_not_opened(tmp_path, text):
+    assert address_problem(text) is None
+    (tmp_path / "campaign.toml").write_text(HEAD + MIC + RUN.format(f"'{text}', 'b.h5'"), encoding="utf-8")
+    one, other = load_campaign(tmp_path).runs[0].logs
+    assert (one.text, one.url, one.to_fetch) == (text, text, True)
+    assert (other.url, other.to_fetch, other.path) == (None, False, tmp_path / "b.h5")
+    (tmp_path / "campaign.toml").write_text(HEAD + "runs = 'runs.csv'\n" + MIC, encoding="utf-8")
+    (tmp_path / "runs.csv").write_text(f'condition,logs\n1,"{text}|b.h5"\n', encoding="utf-8")
+    assert load_campaign(tmp_path).runs[0].logs == (one, other)
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    {
+        "https://me:secret@example.com/a.h5": "holds a password",
+        "s3://:secret@bucket/a.h5": "holds a password",
+        "zip://a.h5::https://example.com/a.zip": "'::'",
+        "s3:\\\\bucket\\a.h5": "backslash",
+        "s3://bucket/a b.h5": "a space",
+        "s3://": "names no file",
+        "s3://bucket/" + "x" * 1000: "1012 characters",
+    }.items(),
+)
+def test_addresses_that_no_log_may_have(tmp_path, text, problem):
+    (tmp_path / "campaign.toml").write_text(HEAD + RUN.format(f"'{text}'"), encoding="utf-8")
+    with pytest.raises(CampaignError, match=r"logs.*must be a path") as caught:
+        load_campaign(tmp_path)
+    if is_address(text):
+        assert problem in address_problem(text)
+        assert problem in str(caught.value)
+
+
+def test_an_address_stands_once(tmp_path):
+    (tmp_path / "campaign.toml").write_text(HEAD + RUN.format("'s3://b/a.h5', 's3://b/a.h5'"), encoding="utf-8")
+    with pytest.raises(CampaignError, match=r"logs names 's3:.*a\.h5' 2 times"):
         load_campaign(tmp_path)
 
 

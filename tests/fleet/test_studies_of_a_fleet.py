@@ -8,6 +8,7 @@ from plain_fleets import plain_fleet
 
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import fleet_toml, load_fleet
+from tdacoustic.fleet.design_sweep import Range
 from tdacoustic.fleet.study_problems import check_studies
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -65,7 +66,7 @@ def load(tmp_path):
 def test_what_is_asked_is_read(load):
     fleet = load(ASKED)
     (sweep,) = fleet.sweep
-    assert sweep.n_points == 12
+    assert (sweep.n_points, sweep.sampling) == (12, "grid")
     assert sweep.conditions == ("1", "3")
     assert [one.condition for one in fleet.reference] == [("4", "5"), None]
     assert [one.tolerated for one in fleet.reference] == [2.0, 1.0]
@@ -187,6 +188,68 @@ def test_conditions_that_a_campaign_names_are_checked_against_it(load):
 
 
 def test_too_many_points_are_refused_with_their_number(load):
-    values = ", ".join(str(number) for number in range(1, 60))
-    with pytest.raises(FleetError, match="has 59 x 59 = 3481 points, allowed are 2000"):
+    values = ", ".join(str(number) for number in range(1, 321))
+    with pytest.raises(FleetError, match="has 320 x 320 = 102400 points, allowed are 100000"):
         load(one_sweep(f'"masuda.constant_db" = [{values}], "operation.torque_n_m" = [{values}]'))
+
+
+HYPERCUBE = 'sampling = "latin_hypercube"\npoints = 200'
+SALTELLI = 'sampling = "saltelli"\nbase_points = 128'
+LEVEL = '"masuda.constant_db" = { from = 18, to = 26 }'
+DAMPING = '"gear_dynamics.mesh_damping_ratio" = { from = 0.02, to = 0.2, scale = "log" }'
+
+
+def test_ranges_are_read_and_written(load, tmp_path):
+    fleet = load(one_sweep(f"{LEVEL}, {DAMPING}", f"{HYPERCUBE}\nseed = 7"))
+    (sweep,) = fleet.sweep
+    assert (sweep.n_points, sweep.seed) == (200, 7)
+    assert sweep.ranges == (Range(18, 26), Range(0.02, 0.2, "log"))
+    again = tmp_path / "again.toml"
+    again.write_text(fleet_toml(fleet), encoding="utf-8")
+    assert load_fleet(again).sweep == fleet.sweep
+    plain = "masuda.constant_db = { from = 18, to = 26 }, gear_dynamics.mesh_damping_ratio.from = 0.02"
+    plain += ', gear_dynamics.mesh_damping_ratio.to = 0.2, gear_dynamics.mesh_damping_ratio.scale = "log"'
+    assert load(one_sweep(plain, f"{HYPERCUBE}\nseed = 7")).sweep == fleet.sweep
+    assert load(one_sweep(f"{LEVEL}, {DAMPING}", SALTELLI)).sweep[0].n_points == 128 * 4
+
+
+@pytest.mark.parametrize(
+    ("parameters", "more", "message"),
+    [
+        (LEVEL, "", r"has a range for 'masuda.constant_db': a grid takes lists of values; ranges need sampling = "),
+        ('"masuda.constant_db" = [18, 26]', HYPERCUBE, r"has a list of values for 'masuda.constant_db': sampling = .*"
+         r"takes ranges, as \{ \"masuda.constant_db\" = \{ from = 18, to = 26 \} \}"),
+        (LEVEL, 'sampling = "hypercube"', r"sampling must be one of grid, latin_hypercube, saltelli, got 'hypercube'"),
+        (LEVEL, 'sampling = "latin_hypercube"', r"sampling = 'latin_hypercube' needs points$"),
+        (LEVEL, 'sampling = "saltelli"\npoints = 64', r"sampling = 'saltelli' needs base_points and has no use for "
+         r"points"),
+        ('"masuda.constant_db" = [18, 26]', "points = 4\nseed = 1", r"'grid' has no use for points and seed"),
+        (LEVEL, 'sampling = "saltelli"\nbase_points = 100', r"must be a power of two, as 64 or 128, got 100"),
+        (LEVEL, 'sampling = "saltelli"\nbase_points = 65536', r"base_points has 65536 x 3 = 196608 points, "),
+        (LEVEL, 'sampling = "latin_hypercube"\npoints = 100001', r"points must be <= 100000, got 100001"),
+        (LEVEL, 'sampling = "latin_hypercube"\npoints = 1', r"points must be >= 2, got 1"),
+        (LEVEL, f"{HYPERCUBE}\nseed = -1", r"seed must be >= 0, got -1"),
+        (LEVEL, f"{HYPERCUBE}\nseeds = 1", r"unknown key 'seeds' in \[\[sweep\]\]; the nearest known key is 'seed'"),
+        ('"masuda.constant_db" = { from = 18, too = 26 }', HYPERCUBE, r"names an unknown key 'too' in the range of "
+         r"'masuda.constant_db'; the nearest known key is 'to'"),
+        ('"masuda.constant_db" = { from = 18 }', HYPERCUBE, r"a finite number as to in .*, got none"),
+        ('"masuda.constant_db" = { from = "a", to = 2 }', HYPERCUBE, r"a finite number as from in .*, got 'a'"),
+        ('"masuda.constant_db" = { from = 18, to = inf }', HYPERCUBE, r"a finite number as to in .*, got inf"),
+        ('"masuda.constant_db" = { from = 26, to = 18 }', HYPERCUBE, r"from < to in .*, got from = 26 and to = 18"),
+        ('"masuda.constant_db" = { from = 18, to = 26, scale = "ln" }', HYPERCUBE, r"a scale of linear or log .* 'ln'"),
+        ('"masuda.constant_db" = { from = 0, to = 26, scale = "log" }', HYPERCUBE, r'from > 0 .* scale = "log", got 0'),
+        ('"masuda.constant" = { from = 18, to = 26 }', HYPERCUBE, r"unknown parameter 'masuda.constant'; the nearest"),
+        ('"gear_dynamics.mass_kg" = { from = 18, to = 26 }', HYPERCUBE, r"'gear_dynamics.mass_kg', which is a list: "
+         r"name one of its entries, as 'gear_dynamics.mass_kg.1'"),
+        ('"model.gear_path" = { from = 18, to = 26 }', HYPERCUBE, r"which is no number: it is 'masuda'"),
+        ('"radiation.air_absorption" = { from = 0, to = 1 }', HYPERCUBE, r"which is no number: it is false"),
+        ('"gear_pair.1.teeth.1" = { from = 28.5, to = 32 }', HYPERCUBE, r"must have whole numbers as from and to"),
+        ('"gear_dynamics.mesh_damping_ratio" = { from = 0.1, to = 2 }', HYPERCUBE, r"the range of "
+         r"'gear_dynamics.mesh_damping_ratio' reaches too far: .* mesh_damping_ratio must be <= 1, got 2"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_range_is_named_in_one_line(load, parameters, more, message):
+    with pytest.raises(FleetError, match=message) as caught:
+        load(one_sweep(parameters, more))
+    assert "[[sweep]] 'one': " in str(caught.value)
+    assert len(str(caught.value).splitlines()) == 1

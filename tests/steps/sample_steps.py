@@ -4,6 +4,7 @@ import os
 import time
 from dataclasses import replace
 from pathlib import Path
+from uuid import uuid4
 
 import numpy as np
 
@@ -36,17 +37,48 @@ def dying(settings):
     os._exit(3)
 
 
+def dying_once(settings):
+    try:
+        Path(settings[0]).touch(exist_ok=False)
+    except FileExistsError:
+        return settings
+    os._exit(3)
+
+
 def slow(settings):
     (Path(settings[0]) / str(os.getpid())).touch()
     time.sleep(settings[1])
     return settings
 
 
+def counted(settings):
+    (Path(settings[0]) / uuid4().hex).touch()
+    time.sleep(settings[1])
+    return settings
+
+
+def large(settings):
+    return ("large", np.full(settings[0], 1.0), np.full(settings[0], 2.0))
+
+
+def threads(settings):
+    """Threads that numba and the libraries of linear algebra would use here."""
+    import numba
+    from threadpoolctl import threadpool_info
+
+    np.ones((8, 8)) @ np.ones((8, 8))
+    return ("threads", numba.get_num_threads(), max(one["num_threads"] for one in threadpool_info()))
+
+
+THREADS = Step("threads", 1, threads, "Threads")
+COUNTED = Step("counted", 1, counted, "Counted")
+LARGE = Step("large", 1, large, "Large")
 NUMBERS = Step("numbers", 1, numbers, "Numbers")
 TOTAL = Step("total", 1, total, "Total")
 FAILING = Step("failing", 1, failing, "Failing")
 BROKEN = Step("broken", 1, broken, "Broken")
 DYING = Step("dying", 1, dying, "Dying")
+DYING_ONCE = Step("dying-once", 1, dying_once, "Dying once")
 SLOW = Step("slow", 1, slow, "Slow")
 
 

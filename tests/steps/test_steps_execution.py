@@ -8,7 +8,7 @@ import time
 from pathlib import Path
 
 import pytest
-from sample_steps import BROKEN, DYING, FAILING, NUMBERS, TOTAL, log_of
+from sample_steps import BROKEN, DYING, DYING_ONCE, FAILING, NUMBERS, TOTAL, log_of
 
 from tdacoustic.errors import AnalysisError
 from tdacoustic.steps import Store, execute, lineage, result_of
@@ -56,11 +56,44 @@ def test_a_defect_propagates(store, jobs):
         execute([BROKEN.task("x", ()), NUMBERS.task("y", (1,))], store, jobs)
 
 
-def test_a_worker_that_dies_gives_one_clear_message_and_what_is_done_is_kept(store):
-    execute([NUMBERS.task("y", (1,))], store)
-    with pytest.raises(AnalysisError, match="a worker process ended before its work was done"):
-        execute([DYING.task("x", ()), NUMBERS.task("z", (2,)), NUMBERS.task("y", (1,))], store, 2)
-    assert NUMBERS.task("y", (1,)).key in store
+def test_a_task_that_kills_its_worker_fails_alone_and_the_others_go_on(store):
+    good = [NUMBERS.task(f"good {number}", (number,)) for number in range(4)]
+    bad = DYING.task("bad", ())
+    below = TOTAL.task("below", (), one=bad, other=good[0])
+    outcome = execute([good[0], bad, below, *good[1:]], store, 2)
+    assert set(outcome.computed) == {task.key for task in good}
+    assert set(outcome.failed) == {bad.key, below.key}
+    for error in outcome.failed.values():
+        assert isinstance(error, AnalysisError)
+        assert str(error).startswith("Dying: bad: a worker process ended before its work was done, and again")
+
+
+def test_a_task_whose_worker_dies_of_something_else_is_computed_after_all(store, tmp_path):
+    tasks = [DYING_ONCE.task("once", (str(tmp_path / "died"),)), *(NUMBERS.task(str(n), (n,)) for n in range(3))]
+    outcome = execute(tasks, store, 2)
+    assert (tmp_path / "died").exists()
+    assert outcome.failed == {}
+    assert set(outcome.computed) == {task.key for task in tasks}
+
+
+UNGUARDED = """
+import sys
+sys.path.insert(0, {here!r})
+from sample_steps import NUMBERS
+from tdacoustic.steps import Store, execute
+execute([NUMBERS.task(str(i), (i,)) for i in range(4)], Store({store!r}), 2)
+"""
+
+
+def test_workers_that_cannot_even_start_are_one_clear_error(tmp_path):
+    script = tmp_path / "unguarded.py"  # each worker runs it again, and ends there
+    script.write_text(UNGUARDED.format(here=str(HERE), store=str(tmp_path / "store")))
+    environment = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}
+    ended = subprocess.run([sys.executable, script], stderr=subprocess.PIPE, env=environment, timeout=60)
+    assert ended.returncode == 1
+    last = ended.stderr.decode().strip().splitlines()[-1]
+    assert last.startswith("tdacoustic.errors.ExecutorError: worker processes end before they take any work")
+    assert 'if __name__ == "__main__":' in last
 
 
 def test_a_pool_of_processes_gives_the_same_bytes(tmp_path):

@@ -131,6 +131,14 @@ def test_a_damaged_note_of_a_hash_is_none(tmp_path, store, note):
     assert log_file(path, store) == kept == LogFile(path, kept.sha256, 3)
 
 
+def test_where_a_log_was_fetched_from_is_no_part_of_the_key(tmp_path):
+    path = tmp_path / "a.h5"
+    log_of(path, "abc")
+    near, far = log_file(path), log_file(path, url="s3://bucket/a.h5")
+    assert (near.url, far.url) == (None, "s3://bucket/a.h5")
+    assert NUMBERS.task("x", (1,), logs=(near,)).key == NUMBERS.task("x", (1,), logs=(far,)).key
+
+
 def test_a_missing_log_is_named(tmp_path):
     with pytest.raises(MissingFileError, match=r"gone\.h5: no such file"):
         log_file(tmp_path / "gone.h5")

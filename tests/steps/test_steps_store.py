@@ -239,6 +239,65 @@ def test_a_result_of_another_schema_is_absent(store):
         store.load(KEY)
 
 
+# ---------------------------------------------------------------- from one store to another
+
+
+def test_the_bytes_of_one_store_are_a_result_in_another(store, tmp_path):
+    other = Store(tmp_path / "other")
+    value = (np.arange(5.0), "text", 3)
+    store.save(KEY, value, RECORD)
+    other.write_bytes(KEY, store.read_bytes(KEY))
+    assert same(other.load(KEY), value)
+    assert other.record(KEY) == RECORD
+    assert other.is_whole(KEY)
+    assert not other.is_whole("cd" * 32)
+    with pytest.raises(KeyError):
+        store.read_bytes("cd" * 32)
+
+
+def test_bytes_that_are_not_whole_are_refused_on_arrival(store, tmp_path):
+    other = Store(tmp_path / "other")
+    value = (np.arange(5.0), "text")
+    store.save(KEY, value, RECORD)
+    whole = store.read_bytes(KEY)
+    for length in range(0, len(whole), 31):
+        with pytest.raises(StoreError, match=f"these {length} bytes are no whole result"):
+            other.write_bytes(KEY, whole[:length])
+    for place in range(0, len(whole), 7):
+        damaged = bytearray(whole)
+        damaged[place] ^= 1 << (place % 8)
+        try:
+            other.write_bytes(KEY, bytes(damaged))
+        except StoreError:
+            continue
+        assert same(other.load(KEY), value), f"byte {place}"
+    (other.folder / "results").mkdir(parents=True, exist_ok=True)
+    assert list(other.folder.rglob("*.tmp")) == []
+
+
+def test_a_pickle_that_arrives_is_not_opened(store, tmp_path):
+    flag = tmp_path / "executed"
+    buffer = io.BytesIO()
+    tree = b'{"schema":"tdacoustic-result/1","result":{"$array":0}}'
+    np.savez(buffer, tree=np.frombuffer(tree, np.uint8), a0=np.array([Evil(flag)], dtype=object))
+    for data in (buffer.getvalue(), pickle.dumps(Evil(flag))):
+        with pytest.raises(StoreError, match="no whole result"):
+            store.write_bytes(KEY, data)
+    assert not flag.exists()
+    assert KEY not in store
+
+
+def test_a_damaged_result_is_not_handed_on_but_removed(store):
+    store.save(KEY, (np.arange(500.0),), RECORD)
+    path = store._path(KEY)
+    damaged = bytearray(path.read_bytes())
+    damaged[len(damaged) // 2] ^= 1
+    path.write_bytes(damaged)
+    with pytest.raises(KeyError, match="no whole result"):
+        store.read_bytes(KEY)
+    assert not path.exists()
+
+
 # ---------------------------------------------------------------- atomic
 
 
@@ -298,6 +357,39 @@ def test_a_store_that_cannot_be_written_is_named(tmp_path):
         compute(NUMBERS.task("x", (1,)), store)
     store.remember_hash(tmp_path / "a.h5", "{}")  # no error: it is only computed again
     assert store.remembered_hash(tmp_path / "a.h5") is None
+
+
+def test_where_a_result_that_is_being_read_cannot_be_replaced_it_stays(store, monkeypatch):
+    """As Windows does, which moves no file over one that is open."""
+    store.save(KEY, (1,), RECORD)
+
+    def refused(self, target):
+        raise PermissionError(13, "used by another process", str(target))
+
+    monkeypatch.setattr(Path, "replace", refused)
+    store.save(KEY, (1,), RECORD)
+    assert store.load(KEY) == (1,) and not list(store.folder.rglob("*.tmp"))
+    with pytest.raises(StoreError):
+        store.save("cd" * 32, (1,), RECORD)
+
+
+AT_ONE_KEY = """
+import sys
+from tdacoustic.steps import Record, Store
+
+store, record = Store(sys.argv[1]), Record("s", 1, "S", "l", "{}", (), (), 0.5)
+for _ in range(40):
+    store.save("ab" * 32, tuple(range(2000)), record)
+    assert store.load("ab" * 32) == tuple(range(2000)) and store.record("ab" * 32) == record
+"""
+
+
+def test_processes_that_keep_and_read_one_key_at_one_time_do_not_disturb_each_other(store):
+    command = [sys.executable, "-c", AT_ONE_KEY, str(store.folder)]
+    environment = {**os.environ, "PYTHONPATH": str(Path(__file__).resolve().parents[2])}
+    several = [subprocess.Popen(command, env=environment, stderr=subprocess.PIPE) for _ in range(3)]
+    assert [(process.communicate(timeout=120)[1], process.returncode) for process in several] == [(b"", 0)] * 3
+    assert store.load(KEY) == tuple(range(2000)) and not list(store.folder.rglob("*.tmp"))
 
 
 def test_where_the_store_is(monkeypatch, tmp_path):

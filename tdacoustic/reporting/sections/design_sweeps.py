@@ -1,4 +1,4 @@
-"""Design sweeps: levels over one parameter as lines, over two as maps, over more as a table."""
+"""Design sweeps: of a grid levels over one parameter as lines, over two as maps, over more as a table."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Heatmap, Line
+from tdacoustic.reporting.sections.design_studies import design_study
 from tdacoustic.reporting.sections.parameters import value_words
 from tdacoustic.reporting.sections.words import joined, slug
 from tdacoustic.results import FleetPrediction
@@ -50,23 +51,29 @@ def design_sweeps(result: FleetPrediction) -> Section | None:
 
 def _of(result: FleetPrediction, found: SweepResult) -> Section:
     name = slug("sweep", found.sweep.name)
-    axes = found.sweep.parameters
-    numeric = all(isinstance(value, float | int) and not isinstance(value, bool) for _, held in axes for value in held)
     refused = [reason for reason in found.reasons if reason]
     blocks: list[Block] = []
     if refused:
         told = joined(list(dict.fromkeys(refused))[:3])
         blocks.append(Notice("warning", f"{len(refused)} of {len(found.points)} points cannot be: {told}."))
-    if np.isfinite(found.of("spl_4m_db")).any():
-        if len(axes) == 1 and numeric and len(found.points) > 1:
-            blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
-        elif len(axes) == 2 and numeric and all(len(values) > 1 for _, values in axes):
-            blocks += _maps(result, found, name)
-    keys = joined([f"{_label(result, key)} is {key}" for key, _ in axes])
-    blocks.append(Paragraph(f"In the fleet file: {keys}."))
+    study = next((one for one in result.studies.sweep_sensitivities if one.found is found), None)
+    blocks += _over_grid(result, found, name) if study is None else design_study(result, study, name)
     table = _table(result, found, name)
     blocks.append(table if len(table.rows) <= 12 else Details("Levels at each point", [table]))
     return Section(name, found.sweep.name, blocks)
+
+
+def _over_grid(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]:
+    keys, axes = found.sweep.keys, found.sweep.values
+    numeric = all(isinstance(value, float | int) and not isinstance(value, bool) for held in axes for value in held)
+    blocks: list[Block] = []
+    if np.isfinite(found.of("spl_4m_db")).any():
+        if len(axes) == 1 and numeric and len(found.points) > 1:
+            blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
+        elif len(axes) == 2 and numeric and all(len(values) > 1 for values in axes):
+            blocks += _maps(result, found, name)
+    told = joined([f"{_label(result, key)} is {key}" for key in keys])
+    return [*blocks, Paragraph(f"In the fleet file: {told}.")]
 
 
 def _label(result: FleetPrediction, key: str) -> str:
@@ -75,7 +82,7 @@ def _label(result: FleetPrediction, key: str) -> str:
 
 
 def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
-    key, values = found.sweep.parameters[0]
+    (key, *_), (values, *_) = found.sweep.keys, found.sweep.values
     there = [place for place in np.argsort(values).tolist() if not found.reasons[place]]
     x = np.array(values, dtype=float)[there]
     levels = found.of("spl_4m_db")[there]
@@ -99,7 +106,7 @@ def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
 
 def _maps(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]:
     """One map a condition, the first in sight."""
-    (key_y, values_y), (key_x, values_x) = found.sweep.parameters
+    (key_y, key_x), (values_y, values_x) = found.sweep.keys, found.sweep.values
     order_y, order_x = np.argsort(values_y), np.argsort(values_x)
     levels = found.of("spl_4m_db").reshape(len(values_y), len(values_x), len(found.conditions))
     axes = [Axis(_label(result, key), unit_of(key)) for key in (key_x, key_y)]
@@ -120,17 +127,18 @@ def _maps(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]
 
 
 def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
-    keys = [key for key, _ in found.sweep.parameters]
+    keys = found.sweep.keys
     columns = [Column("point", "Point", "", 0, "number")]
     columns += [Column(key.replace(".", "_"), _label(result, key), unit_of(key)) for key in keys]
     columns += [Column(f"condition_{one}", f"Condition {one}", "dB", 1, "number") for one in found.conditions]
     columns += [Column("reason", "Why not")] if any(found.reasons) else []
     levels = found.of("spl_4m_db")
     rows: list[list[Cell]] = []
-    for number, (point, reason) in enumerate(zip(found.points, found.reasons, strict=True)):
+    for number, (point, reason) in enumerate(zip(found.points[:MOST_ROWS], found.reasons, strict=False)):
         values = [value_words(key, value) for key, value in point]
         shown = [None if math.isnan(level) else level for level in levels[number].tolist()]
         rows.append([number + 1, *values, *shown, *([reason] if any(found.reasons) else [])])
-    some = "" if len(rows) <= MOST_ROWS else f"; the first {MOST_ROWS} of {len(rows)} points, all are in sweeps.csv"
+    n = len(found.points)
+    some = "" if n <= MOST_ROWS else f"; the first {MOST_ROWS} of {n} points, all are in sweeps.csv"
     caption = f"Total at {result.prediction.surface} by point and condition{some}"
-    return Table(f"{name}-points", caption, columns, rows[:MOST_ROWS], origin="calculated")
+    return Table(f"{name}-points", caption, columns, rows, origin="calculated")

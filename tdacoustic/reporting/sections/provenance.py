@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
 from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
 
 __all__ = ["ASSUMPTIONS", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
+
+MOST_OF_A_STEP: Final = 200
+"""Rows of one step in the page."""
 
 ASSUMPTIONS = (
     "The channels' components, directions, distances and sensitivities are taken from the campaign file.",
@@ -59,11 +64,21 @@ def _shown(value: object) -> str:
 
 
 def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]:
-    """Return the steps of a result, folded away; nothing of none."""
-    rows = [
-        (record.label, record.title, record.step, record.version, key[:16], ", ".join(v[:23] for _, v in record.inputs))
-        for key, record in result.records
-    ]
+    """Return the steps of a result, folded away; nothing of none.
+
+    Of a step that was done very often, as for the batches of a study, the first ones are named.
+    """
+    often = Counter(record.step for _, record in result.records)
+    named: Counter[str] = Counter()
+    rows: list[tuple[str, str, str, int, str, str]] = []
+    for key, record in result.records:
+        named[record.step] += 1
+        made_from = ", ".join(v[:23] for _, v in record.inputs)
+        if named[record.step] <= MOST_OF_A_STEP:
+            rows.append((record.label, record.title, record.step, record.version, key[:16], made_from))
+        elif named[record.step] == often[record.step]:
+            more = f"{often[record.step] - MOST_OF_A_STEP} more, see manifest.json"
+            rows.append((more, record.title, record.step, record.version, "", ""))
     columns = (
         Column("label", "Of"),
         Column("title", "Step"),
@@ -73,4 +88,4 @@ def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]
         Column("inputs", "Made from"),
     )
     table = Table("steps", "Steps and what they were made from", columns, rows)
-    return [Details(f"{len(rows)} steps", [table])] if rows else []
+    return [Details(f"{len(result.records)} steps", [table])] if rows else []

@@ -1,0 +1,67 @@
+"""The page of the fleet view, section by section."""
+
+from __future__ import annotations
+
+from tdacoustic import __version__
+from tdacoustic.gathering.gathered import Gathering
+from tdacoustic.reporting.document import Document, Fact, Notice
+from tdacoustic.reporting.measured_report import MEASURED_FOOTER
+from tdacoustic.reporting.sections.campaigns_answer import campaigns_answer
+from tdacoustic.reporting.sections.campaigns_dominance import campaigns_dominance
+from tdacoustic.reporting.sections.campaigns_levels import campaigns_levels
+from tdacoustic.reporting.sections.campaigns_list import campaigns_list, campaigns_sources
+from tdacoustic.reporting.sections.campaigns_outliers import campaigns_outliers
+from tdacoustic.reporting.sections.campaigns_parameters import campaigns_parameters
+from tdacoustic.reporting.sections.campaigns_quality import campaigns_quality
+
+__all__ = ["fleet_report"]
+
+
+def fleet_report(gathering: Gathering) -> Document:
+    """Return the page on many campaigns.
+
+    Parameters
+    ----------
+    gathering : Gathering
+        Of at least one result.
+    """
+    origins = gathering.origins
+    notices = []
+    made = len(gathering.of_origin("synthetic"))
+    if made:
+        held = len(gathering.results)
+        which = "Every campaign here" if made == held else f"{made} of {held} campaigns here"
+        text = f"{which} {'was' if made == 1 or made == held else 'were'} made by a program; nothing in "
+        notices.append(Notice("synthetic", f"{text}{'it' if made == 1 or made == held else 'them'} was measured."))
+    found = [
+        campaigns_dominance(gathering),
+        campaigns_levels(gathering),
+        campaigns_parameters(gathering),
+        campaigns_outliers(gathering),
+        campaigns_quality(gathering),
+        campaigns_list(gathering),
+        campaigns_sources(gathering),
+    ]
+    return Document(
+        title="Fleet view",
+        subtitle="Noise and vibration of traction drives: what the results of many campaigns say together",
+        origin=origins[0] if len(origins) == 1 else "mixed",
+        summary=campaigns_answer(gathering),
+        notices=notices,
+        sections=[section for section in found if section is not None],
+        facts=_facts(gathering),
+        footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER],
+    )
+
+
+def _facts(gathering: Gathering) -> list[Fact]:
+    trains = {result.identity.train for result in gathering.results if result.identity.train}
+    years = sorted({result.identity.year for result in gathering.results if result.identity.year is not None})
+    span = "not known" if not years else str(years[0]) if len(years) == 1 else f"{years[0]} to {years[-1]}"
+    counts = [Fact("Campaigns", str(len(gathering.of_origin(origin))), origin) for origin in gathering.origins]
+    return [
+        *counts,
+        Fact("Trains", str(len(trains)) if trains else "not known"),
+        Fact("Years", span),
+        Fact("Left out", str(len(gathering.left_out))),
+    ]

@@ -1,0 +1,266 @@
+"""Levels at 4 m over speed and over years, each origin by itself."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.gathering.gathered import Gathering
+from tdacoustic.gathering.levels import BandMedian, LevelPoint, band_medians, grouped, level_points, year_medians
+from tdacoustic.gathering.outliers import BAND_KM_H
+from tdacoustic.gathering.overview import Origin
+from tdacoustic.gathering.speed_bands import SpeedBand, band_at, band_width
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.figure import Axis, Band, Figure, Line, Markers, Symbol
+from tdacoustic.reporting.sections.campaigns_rows import (
+    MOST_POINTS,
+    MOST_ROWS,
+    name_cell,
+    plural,
+    short,
+    shown_of,
+    spread_out,
+    when,
+)
+
+__all__ = ["campaigns_levels"]
+
+MOST_LINES: Final = 6
+"""Trains, or fleets, that a figure draws one by one; the seventh and eighth colours are the single values'."""
+
+MOST_BANDS: Final = 10
+OVER_YEARS: Final = 4
+GREY: Final = 7
+
+_EXPLAINED: Final = (
+    "The unweighted level at 4 m of a condition is the energy mean over its runs and over the microphones within 5 % "
+    "of 4 m, corrected for background where background was recorded; channels that are bad do not enter. Levels that a "
+    "campaign states instead of recording them are drawn as crosses. A level of a result without distances of its "
+    "microphones is not here."
+)
+_LEVEL: Final = Axis("Level at 4 m", "dB", reference="20 µPa")
+
+
+def campaigns_levels(gathering: Gathering) -> Section | None:
+    """Return the section on levels; None where no campaign has one at 4 m."""
+    found = [(origin, level_points(gathering.results, origin)) for origin in gathering.origins]
+    held = [(origin, points) for origin, points in found if points]
+    if not held:
+        return None
+    blocks: list[Block] = [Paragraph(_EXPLAINED)]
+    for origin, points in held:
+        blocks += [_over_speed(origin, points), *_over_years(origin, points), _table(gathering, origin, points)]
+    return Section("levels", "Levels at 4 m", blocks)
+
+
+# ---------------------------------------------------------------- over speed
+
+
+def _over_speed(origin: Origin, points: Sequence[LevelPoint]) -> FigureBlock:
+    recorded = [point for point in points if point.row.level_from == "recorded"]
+    stated = [point for point in points if point.row.level_from == "stated"]
+    trains = grouped(points, _train)
+    few = len(trains) <= MOST_LINES
+    groups = _trains(recorded) if few else _fleets(recorded)
+    single = any(each.n > 1 for _, held in groups for each in band_medians(held, BAND_KM_H))
+    shown = spread_out(recorded) if single else []
+    elements: list[Markers | Line | Band] = [_values(shown, "single conditions", "circle")] if shown else []
+    for slot, (name, held) in enumerate(groups[:MOST_LINES]):
+        elements += _line(name, band_medians(held, BAND_KM_H if few else _width(points)), slot, not few)
+    if stated:
+        elements.append(_values(spread_out(stated), "stated levels", "x"))
+    words = f"{plural(len(points), 'value')} of {plural(len(trains), 'train or campaign', 'trains or campaigns')}."
+    if groups:
+        words += " Lines are medians" + (f" in bands of {BAND_KM_H:g} km/h." if few else f"{_band_words(points)}.")
+    left = len(groups) - MOST_LINES
+    if not few and left > 0:
+        words += f" {plural(left, 'fleet')} with fewer values {'has' if left == 1 else 'have'} no line."
+    left_out = shown_of(len(shown), len(recorded), "recorded values", "overview") if single else ""
+    figure = Figure(
+        f"levels-over-speed-{origin}",
+        f"Level at 4 m over speed, {origin}",
+        f"{words}{left_out}",
+        Axis("Train speed", "km/h"),
+        _LEVEL,
+        elements,
+        height=440,
+    )
+    return FigureBlock(figure, origin)
+
+
+def _train(point: LevelPoint) -> tuple[str, str]:
+    return point.result.train, point.result.fleet
+
+
+def _trains(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
+    """Points by train; one that several fleets have with the fleet's name."""
+    found = grouped(points, _train)
+    names = [train for train, _ in found]
+    return [
+        (train if names.count(train) == 1 else f"{train}, {fleet or 'no fleet'}", held)
+        for (train, fleet), held in found.items()
+    ]
+
+
+def _width(points: Sequence[LevelPoint]) -> float:
+    return band_width((point.speed_km_h for point in points), 20)
+
+
+def _band_words(points: Sequence[LevelPoint]) -> str:
+    return f" of a fleet in bands of {_width(points):g} km/h, with the range that 80 % of the values of a band lie in"
+
+
+def _fleets(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
+    """Points by fleet, the largest first."""
+    found = grouped(points, lambda point: point.result.fleet or "no fleet")
+    return sorted(found.items(), key=lambda item: -len(item[1]))
+
+
+def _line(name: str, medians: Sequence[BandMedian], slot: int, ranges: bool) -> list[Line | Band]:
+    speeds = np.array([each.speed_km_h for each in medians])
+    line = Line(speeds, np.array([each.level_db for each in medians]), short(name, 40), color=slot, points=True)
+    wide = [each for each in medians if each.low_db is not None and each.high_db is not None]
+    if not ranges or len(wide) < 2:
+        return [line]
+    low, high = ([getattr(each, key) for each in wide] for key in ("low_db", "high_db"))
+    band = Band(
+        np.array([each.speed_km_h for each in wide]),
+        np.array(low),
+        np.array(high),
+        f"{short(name, 40)}, 80 %",
+        color=slot,
+    )
+    return [band, line]
+
+
+def _values(points: Sequence[LevelPoint], name: str, symbol: Symbol) -> Markers:
+    return Markers(
+        np.array([point.speed_km_h for point in points]),
+        np.array([point.level_db for point in points]),
+        name,
+        texts=[_hover(point) for point in points],
+        symbol=symbol,
+        color=GREY,
+    )
+
+
+def _hover(point: LevelPoint) -> str:
+    parts = (short(point.result.train, 40), f"condition {short(point.row.condition, 24)}", when(point.result))
+    return ", ".join(part for part in parts if part)
+
+
+# ---------------------------------------------------------------- over years
+
+
+def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBlock | Paragraph]:
+    dated = [point for point in points if point.year is not None and point.row.level_from == "recorded"]
+    years = {point.result.identity.year for point in dated}
+    if len(years) < 2:
+        known = (
+            f"recorded levels are known of {next(iter(years))} alone" if years else "no year is known of recorded ones"
+        )
+        return [Paragraph(f"Levels over years, {origin}: {known}, so there is no figure.")]
+    groups = grouped(dated, lambda point: (point.result.fleet, band_at(point.speed_km_h, BAND_KM_H)))
+    usable = {key: held for key, held in groups.items() if len({p.result.identity.year for p in held}) > 1}
+    if not usable:
+        return [Paragraph(f"Levels over years, {origin}: no speed was measured in two years, so there is no figure.")]
+    several = len({fleet for fleet, _ in usable}) > 1
+    largest = _chosen(usable)
+    at = f" at {largest[0][1].words} km/h" if several else ""
+    elements: list[Markers | Line] = []
+    for slot, (fleet, band) in enumerate(sorted(largest)):
+        held = usable[fleet, band]
+        name = short(fleet or "no fleet", 32) if several else f"{band.words} km/h"
+        shown = spread_out(held, MOST_POINTS // OVER_YEARS)
+        elements.append(
+            Markers(
+                np.array([point.year for point in shown], dtype=np.float64),
+                np.array([point.level_db for point in shown]),
+                f"{name}, single",
+                texts=[_hover(point) for point in shown],
+                color=slot,
+                symbol=("circle", "square", "diamond", "triangle")[slot],
+            )
+        )
+        medians = year_medians(held)
+        times, levels = (np.array(values) for values in zip(*medians, strict=True))
+        elements.append(Line(times, levels, f"{name}, median", color=slot))
+    words = (
+        "Single conditions where their day is known at that day, else in the middle of their year; lines are medians "
+    )
+    words += "of a year. A level may change with the track, the load and the place as well as with the train."
+    rest = len(usable) - len(largest)
+    if rest:
+        words += f" {plural(rest, 'more speed')} of a fleet {'was' if rest == 1 else 'were'} measured in several years."
+    return [
+        FigureBlock(
+            Figure(
+                f"levels-over-years-{origin}",
+                f"Level at 4 m over the years{at}, {origin}",
+                words,
+                Axis("Year"),
+                _LEVEL,
+                elements,
+                height=400,
+            ),
+            origin,
+        )
+    ]
+
+
+def _chosen(usable: dict[tuple[str, SpeedBand], list[LevelPoint]]) -> list[tuple[str, SpeedBand]]:
+    """Of one fleet its most frequent speeds; of several the most frequent speed, at which they can be compared."""
+    ranked = sorted(usable, key=lambda key: (-len(usable[key]), key))
+    if len({fleet for fleet, _ in usable}) > 1:
+        counts: dict[SpeedBand, int] = {}
+        for fleet, band in usable:
+            counts[band] = counts.get(band, 0) + len(usable[fleet, band])
+        common = max(counts, key=lambda band: (counts[band], band))
+        ranked = [key for key in ranked if key[1] == common]
+    return ranked[:OVER_YEARS]
+
+
+# ---------------------------------------------------------------- table
+
+
+def _table(gathering: Gathering, origin: Origin, points: Sequence[LevelPoint]) -> Table:
+    width = band_width((point.speed_km_h for point in points), MOST_BANDS)
+    bands = sorted({band_at(point.speed_km_h, width) for point in points})
+    trains = grouped(points, _whose)
+    stated = any(point.row.level_from == "stated" for point in points)
+    corrected = any(point.row.correction != "none" for point in points)
+    columns = [
+        Column("train", "Train, else campaign"),
+        Column("fleet", "Fleet"),
+        *([Column("level_from", "Levels")] if stated else []),
+        Column("years", "Years"),
+        Column("values", "Values", kind="number", digits=0),
+        *(Column(f"band_{band.low:.16g}_km_h", band.words, "km/h", digits=1, kind="number") for band in bands),
+        *([Column("corrected", "Background correction")] if corrected else []),
+    ]
+    rows: list[list[Cell]] = []
+    for key in sorted(trains)[:MOST_ROWS]:
+        fleet, *_, level_from = key
+        held = trains[key]
+        levels = grouped(held, lambda point: band_at(point.speed_km_h, width))
+        medians: list[Cell] = [
+            statistics.median(point.level_db for point in levels[band]) if band in levels else None for band in bands
+        ]
+        results = list({id(point.result): point.result for point in held}.values())
+        corrections = sorted({point.row.correction for point in held})
+        years = sorted({result.identity.year for result in results if result.identity.year is not None})
+        span = "" if not years else str(years[0]) if len(years) == 1 else f"{years[0]}–{years[-1]}"
+        whose: list[Cell] = [name_cell(gathering, results), fleet or None, *([level_from] if stated else [])]
+        rows.append([*whose, span or None, len(held), *medians, *([", ".join(corrections)] if corrected else [])])
+    left_out = shown_of(len(rows), len(trains), "rows", "overview")
+    caption = f"Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians.{left_out}"
+    return Table(f"levels-{origin}", caption.rstrip("."), columns, rows, origin=origin)
+
+
+def _whose(point: LevelPoint) -> tuple[str, bool, str, str]:
+    """What makes a row: recorded and stated levels are not mixed."""
+    result = point.result
+    return result.fleet, not result.identity.train, result.train, point.row.level_from

@@ -1,0 +1,199 @@
+"""Studies over ranges: which parameters decide the level, and how it lies over each."""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+
+from tdacoustic.reporting.document import (
+    Block,
+    Cell,
+    Column,
+    Details,
+    FigureBlock,
+    Notice,
+    Paragraph,
+    Sentences,
+    Table,
+)
+from tdacoustic.reporting.figure import Axis, Bars, Figure, Markers
+from tdacoustic.reporting.sections.design_study_words import (
+    left_out_words,
+    level_words,
+    method_words,
+    study_words,
+)
+from tdacoustic.reporting.sections.parameters import value_words
+from tdacoustic.reporting.sections.words import slug
+from tdacoustic.results import FleetPrediction
+from tdacoustic.studies import LevelInStudy, SweepSensitivity
+from tdacoustic.studies.indices import Estimate
+from tdacoustic.studies.words import number_words, unit_of
+
+__all__ = ["design_study"]
+
+MOST_BARS: Final = 10
+"""Parameters of a figure, the most important ones."""
+MOST_LEVELS: Final = 7
+"""Conditions side by side, beside their energy mean."""
+MOST_SCATTERS: Final = 6
+MOST_MARKS: Final = 1000
+"""Points of a scatter, evenly taken from all."""
+
+
+def design_study(result: FleetPrediction, study: SweepSensitivity, name: str) -> list[Block]:
+    """Return what the report says of a study over ranges.
+
+    Parameters
+    ----------
+    result : FleetPrediction
+    study : SweepSensitivity
+    name : str
+        Anchor of its section.
+    """
+    blocks: list[Block] = []
+    left_out = left_out_words(study)
+    if left_out:
+        blocks.append(Notice("info", left_out))
+    blocks.append(Paragraph(method_words(study)))
+    ranges = _ranges(result, study, name)
+    blocks.append(ranges if len(ranges.rows) <= MOST_BARS else Details("Parameters and ranges", [ranges]))
+    said = study_words(result.fleet, study)
+    if said:
+        blocks.append(Sentences(said))
+    level = study.overall
+    if level is None or level.weights is None:
+        return blocks
+    if level.total is not None:
+        blocks.append(FigureBlock(_indices(result, study, level, name), "calculated"))
+    blocks.append(FigureBlock(_by_condition(result, study, name), "calculated"))
+    scatters = [FigureBlock(_scatter(result, study, level, place, name)) for place in study.ranking()[:MOST_SCATTERS]]
+    blocks.append(scatters[0])
+    if scatters[1:]:
+        blocks.append(Details("The level over the next parameters", scatters[1:]))
+    blocks.append(Details("Sensitivities by parameter and condition", [_table(result, study, name)]))
+    return blocks
+
+
+def _ranges(result: FleetPrediction, study: SweepSensitivity, name: str) -> Table:
+    columns = (
+        Column("words", "Parameter"),
+        Column("from", "From", align="right"),
+        Column("to", "To", align="right"),
+        Column("spread", "Values"),
+        Column("parameter", "Key"),
+    )
+    rows: list[list[Cell]] = []
+    for key, held in zip(study.keys, study.found.sweep.ranges, strict=True):
+        unit = unit_of(key)
+        ends = [
+            f"{value_words(key, end)}{unit if unit == '°' else f' {unit}'}".rstrip() for end in (held.low, held.high)
+        ]
+        spread = "each ratio as likely" if held.scale == "log" else "each as likely"
+        whole = ", whole numbers alone" if key in study.found.whole else ""
+        rows.append([number_words(key, result.fleet), *ends, f"{spread}{whole}", key])
+    return Table(f"{name}-ranges", "Parameters and ranges", columns, rows)
+
+
+def _names(result: FleetPrediction, study: SweepSensitivity) -> tuple[list[int], list[str]]:
+    places = list(study.ranking()[:MOST_BARS])
+    return places, [number_words(study.keys[place], result.fleet) for place in places]
+
+
+def _some(study: SweepSensitivity) -> str:
+    n = len(study.keys)
+    return f" The first {MOST_BARS} of {n} parameters are drawn." if n > MOST_BARS else ""
+
+
+def _bars(names: list[str], places: list[int], held: Estimate | None, name: str) -> Bars:
+    if held is None:
+        return Bars(names, np.full(len(names), np.nan), name)
+    value = held.value[places]
+    errors = np.clip(np.stack([value - held.low[places], held.high[places] - value]), 0.0, None)
+    return Bars(names, value, name, errors)
+
+
+def _indices(result: FleetPrediction, study: SweepSensitivity, level: LevelInStudy, name: str) -> Figure:
+    places, names = _names(result, study)
+    bars = [
+        _bars(names, places, level.first_order, "on its own (first order)"),
+        _bars(names, places, level.total, "with interactions (total)"),
+    ]
+    caption = (
+        f"Of the {level_words(level)} at {result.prediction.surface}; lines are intervals of 95 %. An index below 0 is "
+        f"one of 0 from too few points.{_some(study)}"
+    )
+    title = "Part of the level's variance that each parameter makes"
+    return Figure(f"{name}-indices", title, caption, Axis("Parameter"), Axis("Part of the variance"), bars, height=460)
+
+
+def _by_condition(result: FleetPrediction, study: SweepSensitivity, name: str) -> Figure:
+    places, names = _names(result, study)
+    conditions = [level for level in study.levels if level.condition is not None]
+    shown = [*conditions[:MOST_LEVELS], *(level for level in study.levels if level.condition is None)]
+    bars = [
+        _bars(
+            names, places, level.weights, "energy mean" if level.condition is None else f"condition {level.condition}"
+        )
+        for level in shown
+    ]
+    variance = any(level.total is not None for level in shown)
+    what = "Total index" if variance else "Standardised regression coefficient"
+    some = f" {MOST_LEVELS} of {len(conditions)} conditions are drawn." if len(conditions) > MOST_LEVELS else ""
+    caption = f"At {result.prediction.surface}; lines are intervals of 95 %.{some}{_some(study)}"
+    axes = Axis("Parameter"), Axis(what)
+    return Figure(f"{name}-conditions", f"{what} of each parameter by condition", caption, *axes, bars, height=460)
+
+
+def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStudy, place: int, name: str) -> Figure:
+    key, held = study.keys[place], study.found.sweep.ranges[place]
+    there = np.flatnonzero(np.isfinite(level.level_db))
+    if study.found.sweep.sampling == "saltelli":  # the others repeat the values of these
+        there = there[there % (len(study.keys) + 2) < 2]
+    some = there[np.linspace(0, len(there) - 1, min(MOST_MARKS, len(there))).round().astype(int)]
+    values = np.array([study.found.points[number][place][1] for number in some.tolist()], dtype=float)
+    words = number_words(key, result.fleet)
+    drawn = f"{len(some)} of {len(there)} points" if len(some) < len(there) else f"{len(some)} points"
+    return Figure(
+        slug(name, "over", key),
+        f"Level over {words}",
+        f"{level_words(level).capitalize()} at {result.prediction.surface}, all other parameters anywhere in their "
+        f"ranges; {drawn}.",
+        Axis(f"{words[:1].upper()}{words[1:]}", unit_of(key), held.scale),
+        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        [Markers(values, level.level_db[some], level_words(level))],
+    )
+
+
+def _table(result: FleetPrediction, study: SweepSensitivity, name: str) -> Table:
+    variance = study.found.sweep.sampling == "saltelli"
+    titles = {
+        "slope": ("Over its range", "dB", 1),
+        "standardised": ("Standardised regression", "", 2),
+        "rank": ("Rank correlation", "", 2),
+        **({"first": ("First order", "", 2), "total": ("Total", "", 2)} if variance else {}),
+    }
+    columns = [Column("parameter", "Parameter"), Column("level", "Level")]
+    for measure, (title, unit, digits) in titles.items():
+        for end, of in (("", ""), ("_low", ", from"), ("_high", ", to")):
+            columns.append(Column(f"{measure}{end}", f"{title}{of}", unit, digits, "number"))
+    columns.append(Column("explained", "R²", "", 2, "number"))
+    rows: list[list[Cell]] = []
+    for place in study.ranking():
+        words = number_words(study.keys[place], result.fleet)
+        for level in study.levels:
+            told = "energy mean" if level.condition is None else f"condition {level.condition}"
+            held = level.regression
+            of_line = (None, None, None) if held is None else (held.slope, held.standardised, held.rank)
+            estimates = [*of_line, *((level.first_order, level.total) if variance else ())]
+            cells = [cell for one in estimates for cell in _cells(one, place)]
+            rows.append([words, told, *cells, None if held is None else held.explained])
+    caption = f"Sensitivities of the total at {result.prediction.surface}, with intervals of 95 %"
+    return Table(f"{name}-sensitivities", caption, columns, rows, origin="calculated")
+
+
+def _cells(held: Estimate | None, place: int) -> tuple[Cell, Cell, Cell]:
+    if held is None:
+        return None, None, None
+    return float(held.value[place]), float(held.low[place]), float(held.high[place])

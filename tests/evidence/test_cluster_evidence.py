@@ -1,0 +1,42 @@
+"""The cluster study: whether its record is of these sources, and what it must hold."""
+
+import pytest
+
+pytest.importorskip("distributed", reason="the extra `cluster` is not installed")
+
+from studies import study_module
+
+RERUN = "python tests/evidence/cluster_study.py"
+
+
+@pytest.fixture(scope="module")
+def study():
+    with study_module("cluster_study", "steps", "workflows") as module:
+        yield module
+
+
+@pytest.fixture(scope="module")
+def record(study):
+    return study.record()
+
+
+def test_the_record_is_of_these_sources(study, record):
+    """Who changes a module of steps runs the study again."""
+    assert record["sources_sha256"] == study.sources(), f"the record is stale: {RERUN}"
+
+
+def test_every_way_gives_the_same_bits(record):
+    assert len(record["ways"]) == 6
+    assert {way["bits"] for way in record["ways"].values()} == {record["killed"]["bits"]}
+
+
+def test_two_workers_were_killed_and_nothing_was_lost(record):
+    assert record["killed"]["killed"] == 2
+    assert record["killed"]["problems"] == record["ways"]["1 process"]["problems"]
+
+
+def test_two_workers_share_the_steps(record):
+    """Where one worker takes as long as all steps together, two take some half of that, and what the client does."""
+    for travel in ("", ", results travel"):
+        one, two = (record["ways"][f"cluster, {count}{travel}"] for count in ("1 worker", "2 workers"))
+        assert one["wall_s"] / two["wall_s"] > 1.3
