@@ -302,15 +302,17 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
 
 
 def _png(canvas: MatplotlibFigure, dpi: int, colours: int | None = None) -> bytes:
-    raw = io.BytesIO()
-    canvas.savefig(raw, format="png", dpi=dpi, metadata={"Software": None}, facecolor="white")
+    packed = io.BytesIO()
     if colours is None:
-        return raw.getvalue()
+        canvas.savefig(packed, format="png", dpi=dpi, metadata={"Software": None}, facecolor="white")
+        return packed.getvalue()
     from PIL import Image  # comes with matplotlib
 
-    with Image.open(raw) as image:
+    canvas.set_dpi(dpi)
+    canvas.set_facecolor("white")
+    canvas.canvas.draw()  # `savefig` draws twice, and packs a picture that would only be unpacked again
+    with Image.fromarray(np.asarray(canvas.canvas.buffer_rgba())) as image:  # type: ignore[attr-defined]
         small = image.convert("RGB").quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    packed = io.BytesIO()
     small.save(packed, format="png", optimize=True)
     return packed.getvalue()
 
