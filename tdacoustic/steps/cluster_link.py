@@ -83,17 +83,13 @@ def link_to(address: str) -> Link:
 
 def _connected(address: str) -> Any:
     try:
-        from distributed import Client, Security
+        from distributed import Client
     except ImportError as error:
         raise MissingPackageError(
             f"a scheduler ({address}) needs the package {error.name}, which is not installed: "
             "pip install 'tdacoustic[cluster]'"
         ) from error
-    if address.startswith("tls://") and Security().get_connection_args("client")["ssl_context"] is None:
-        raise ExecutorError(
-            f"the scheduler {address} asks for certificates, and dask's configuration names none: "
-            "distributed.comm.tls.ca-file, distributed.comm.tls.client.cert and .key"
-        )
+    _check_address(address)  # a client that fails while it is made leaves dask's own thread in disorder
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # its traces of a lost scheduler: we say it
     try:
         return Client(address, timeout=_CONNECT_S, set_as_default=False, name="tdacoustic")
@@ -103,6 +99,23 @@ def _connected(address: str) -> Any:
             f"the scheduler {address} does not answer ({type(error).__name__}: {words[:200]}); is `dask scheduler` "
             "running there?"
         ) from error
+
+
+def _check_address(address: str) -> None:
+    from distributed import Security
+    from distributed.comm import parse_address
+    from distributed.comm.registry import get_backend
+
+    try:
+        scheme, _ = parse_address(address)
+        get_backend(scheme)
+    except ValueError as error:
+        raise ExecutorError(f"the scheduler {address} has no address of dask ({error}), as tcp://host:8786") from error
+    if scheme == "tls" and Security().get_connection_args("client")["ssl_context"] is None:
+        raise ExecutorError(
+            f"the scheduler {address} asks for certificates, and dask's configuration names none: "
+            "distributed.comm.tls.ca-file, distributed.comm.tls.client.cert and .key"
+        )
 
 
 def forget(address: str) -> None:

@@ -79,7 +79,7 @@ def _drive(ledger: Ledger, store: Store, executor: Executor) -> None:
         if any(_is_broken(future) for future in done):
             done = wait(running).done  # all that was in flight has broken with it, or was done just before
         suspects = []
-        for future in done:
+        for future in [future for future in running if future in done]:
             task = running.pop(future)
             if _is_broken(future):
                 suspects.append(task)

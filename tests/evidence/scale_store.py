@@ -65,6 +65,32 @@ def _listed_s(folder: Path) -> float:
     return time.perf_counter() - began
 
 
+def measured_sweep(folder: Path, n_names: int, n_asked: int = 50) -> dict[str, Any]:
+    """Measure the look for left-overs in one folder of so many results, which each result that is kept costs."""
+    from tdacoustic.steps.store import _sweep
+
+    folder.mkdir()
+    for number in range(n_names):
+        (folder / f"{key_of(number)}.npz").touch()
+    return {"names": n_names, "sweep_us": each_us(lambda _: _sweep(folder), range(n_asked))}
+
+
+def measured_checks(folder: Path) -> float:
+    """Return the time in which one result is found to be up to date, us."""
+    from tdacoustic.steps import Store
+    from tdacoustic.workflows.up_to_date import software, standing
+
+    software()  # once a process
+    store = Store(folder / "store")
+    held = sorted(path.parent for path in (folder / "out").glob("*/manifest.json"))
+    stands = []
+    took_us = each_us(
+        lambda out: stands.append(standing(out, folder / "campaigns" / out.name / "campaign.toml", store)), held
+    )
+    assert all(stands)
+    return took_us
+
+
 def measured_notes(folder: Path, n_notes: int, n_asked: int = 500) -> dict[str, Any]:
     """Measure the remembered hashes of logs: one small file a log, all in one folder."""
     from tdacoustic.steps import Store

@@ -26,7 +26,7 @@ sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).resolve().parents
 
 from scale_campaigns import change_a_sample, has_plain_logs, logs_of, make_campaigns  # noqa: E402
 from scale_processes import kill_at_random, watched  # noqa: E402
-from scale_store import measured_book, measured_notes, measured_store  # noqa: E402
+from scale_store import measured_book, measured_checks, measured_notes, measured_store, measured_sweep  # noqa: E402
 from scale_words import put  # noqa: E402
 
 HERE = Path(__file__).parent
@@ -215,6 +215,7 @@ def studied(scratch: Path, n_campaigns: int, n_kills: int, n_files: int) -> dict
         "workers": by_workers,
         "one_and_more_workers_differ_in": len(dict(files[0].items() ^ files[-1].items())),
         **sizes(most),
+        "check_us": measured_checks(most),
     }
     result["changed"] = changed(scratch, most)
     shutil.rmtree(scratch / "copy")
@@ -222,6 +223,7 @@ def studied(scratch: Path, n_campaigns: int, n_kills: int, n_files: int) -> dict
         scratch, n_kills, most, max(1.0, 1.5 * by_workers[str(max(WORKERS))]["first_s"] / n_kills)
     )
     result["store"] = [measured_store(scratch / f"store-{n}", n) for n in (n_files // 10, n_files)]
+    result["sweep"] = measured_sweep(scratch / "one-folder", 4000)
     result["notes"] = measured_notes(scratch / "notes", n_files)
     result["book"] = measured_book(n_files)
     return result

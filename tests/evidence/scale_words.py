@@ -64,6 +64,9 @@ def _measured_rows(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
             f"is it there: {part['is_there_us']:g} us; its record: {part['record_us']:g} us; "
             f"keep one: {part['save_us']:g} us; list all: {part['list_all_s']:g} s",
         )
+    sweep = found["sweep"]
+    yield f"looking through one folder of {sweep['names']} results", f"{sweep['sweep_us'] / 1000:.1f} ms"
+    yield "finding one result up to date", f"{found['check_us'] / 1000:.1f} ms"
     notes = found["notes"]
     yield (
         f"{notes['notes']} remembered hashes of logs",
@@ -84,19 +87,15 @@ def _extrapolated_rows(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "campaigns", f"{n_campaigns:.0f}"
     yield f"first call, {n} workers", f"{times * part['first_s'] / 3600:.1f} h"
     yield "of it, assembling results and reports", f"{100 * part['again_s'] / part['first_s']:.0f} %"
-    yield "second call, nothing changed", f"{times * part['second_s'] / 60:.1f} min"
+    yield "second call, nothing changed", f"{n_campaigns * found['check_us'] / 60e6:.1f} min"
     yield "results on disk", f"{times * found['bytes_of_results'] / 1e9:.0f} GB"
     yield "of it reports", f"{100 * found['bytes_of_reports'] / found['bytes_of_results']:.0f} %"
     yield "store on disk", f"{times * found['bytes_of_store'] / 1e9:.0f} GB"
     n_files = times * part["steps_kept"]
     yield "results in the store", f"{n_files:.2g} files, {n_files / 256:.0f} in each of its 256 folders"
-    few, many = found["store"]
-    slope = (many["save_us"] - few["save_us"]) / (many["files_in_one_folder"] - few["files_in_one_folder"])
-    at_that = many["save_us"] + slope * (n_files / 256 - many["files_in_one_folder"])
-    yield (
-        "keeping one more result there",
-        f"{at_that / 1000:.1f} ms, at {few['files']} results {few['save_us'] / 1000:.1f} ms",
-    )
+    sweep = found["sweep"]
+    sweep_ms = sweep["sweep_us"] / 1000 * n_files / 256 / sweep["names"]
+    yield "looking through one of these, once for each result kept", f"{sweep_ms:.1f} ms"
     parent = max(part["peak_mib_of_second"] or [0]) + n_campaigns * found["book"]["bytes_of_one"] / 2**20
     yield "memory of the parent", f"{parent:.0f} MiB, {found['book']['bytes_of_one']} bytes a campaign"
 

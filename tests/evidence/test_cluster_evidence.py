@@ -36,7 +36,8 @@ def test_two_workers_were_killed_and_nothing_was_lost(record):
 
 
 def test_two_workers_share_the_steps(record):
-    """Where one worker takes as long as all steps together, two take some half of that, and what the client does."""
+    """How many steps ran at one time on average; less than the workers, because the client does something alone too."""
     for travel in ("", ", results travel"):
         one, two = (record["ways"][f"cluster, {count}{travel}"] for count in ("1 worker", "2 workers"))
-        assert one["wall_s"] / two["wall_s"] > 1.3
+        assert 0.5 < one["side_by_side"] <= 1.0
+        assert 1.2 < two["side_by_side"] <= 2.0

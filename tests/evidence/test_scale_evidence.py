@@ -110,3 +110,8 @@ def test_the_store_is_measured(study, tmp_path):
     assert part["files"] == 300 and part["is_there_us"] > 0.0
     assert study.measured_notes(tmp_path / "notes", 50, 10)["look_up_us"] > 0.0
     assert study.measured_book(100)["bytes_of_one"] > 100
+    assert study.measured_sweep(tmp_path / "one", 50, 5)["sweep_us"] > 0.0
+
+
+def test_a_result_is_found_up_to_date(study, again):
+    assert study.measured_checks(again[0] / "workers-2") > 0.0

@@ -14,7 +14,7 @@ import pytest
 from sample_steps import BROKEN, DYING, FAILING, LARGE, NUMBERS, SLOW, THREADS, TOTAL, log_of
 
 from tdacoustic.errors import AnalysisError, ExecutorError, MissingFileError, MissingPackageError
-from tdacoustic.steps import Cluster, LogFile, Store, cluster_worker, execute, result_of
+from tdacoustic.steps import Cluster, LogFile, Store, cluster_link, cluster_worker, execute, result_of
 from tdacoustic.steps.cluster_check import check_workers
 from tdacoustic.steps.cluster_link import Link, forget
 from tdacoustic.steps.cluster_worker import SharedStore
@@ -167,6 +167,7 @@ def test_a_defect_propagates_and_says_where(tmp_path, two_workers):
     with pytest.raises(ZeroDivisionError, match="a defect") as caught:
         execute([BROKEN.task("x", ())], Store(tmp_path / "store"), Cluster(two_workers.address))
     assert "sample_steps.py" in caught.value.__notes__[0]
+    assert not [link for link in cluster_link._links if link[1] == two_workers.address]  # closed: the program may end
 
 
 @pytest.mark.parametrize("shared", [True, False], ids=["shared", "travels"])
@@ -361,6 +362,20 @@ def test_a_task_for_other_software_is_refused_by_the_worker(monkeypatch):
             raise pickle.loads(reply["error"])
 
 
+def test_a_worker_that_does_not_see_the_store_leaves_it_alone(tmp_path, monkeypatch):
+    monkeypatch.setattr(cluster_worker, "_worker", lambda: "tcp://a")
+    shared = SharedStore.of(Store(tmp_path / "store"))
+    task = NUMBERS.task("x", (1,))
+    for sign in ("00" * 16, shared.sign):
+        call = cluster_worker.Call(task, own_software(), SharedStore(shared.folder, sign))
+        reply = pickle.loads(call.to_bytes())
+        assert reply["seen"] is (sign == shared.sign)
+        assert (task.key in Store(tmp_path / "store")) is (sign == shared.sign)
+    for path in (tmp_path / "store" / "signs").iterdir():
+        path.write_text("of another store")
+    assert not shared.is_seen()
+
+
 def test_tasks_of_one_process_take_turns():
     inside, most = [], []
 
@@ -419,7 +434,9 @@ def test_a_scheduler_that_is_not_there_is_one_clear_error(store, monkeypatch):
     task = NUMBERS.task("x", (1,))
     with pytest.raises(ExecutorError, match=r"the scheduler tcp://127\.0\.0\.1:9 does not answer"):
         execute([task], store, Cluster("tcp://127.0.0.1:9"))
-    with pytest.raises(ExecutorError, match="the scheduler nonsense://x does not answer"):
+    with pytest.raises(
+        ExecutorError, match=r"the scheduler nonsense://x has no address of dask \(unknown address scheme 'nonsense'"
+    ):
         execute([task], store, Cluster("nonsense://x"))
     with pytest.raises(ExecutorError, match=r"the scheduler tls://x:1 asks for certificates.*distributed\.comm\.tls"):
         execute([task], store, Cluster("tls://x:1"))

@@ -113,6 +113,7 @@ def test_the_disk_is_not_filled(tmp_path, shelf, said, monkeypatch):
     with pytest.raises(FetchError, match=r"shelf://archive/a\.h5: .* bytes, but the disk of .* has room for 1000000"):
         fetch("shelf://archive/a.h5", tmp_path)
     assert files_in(tmp_path) == []
+    assert shelf.opened == (0 if said else 1)
 
 
 def test_errors_are_one_line_and_name_the_url(tmp_path, shelf):

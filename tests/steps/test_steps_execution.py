@@ -60,12 +60,14 @@ def test_a_task_that_kills_its_worker_fails_alone_and_the_others_go_on(store):
     good = [NUMBERS.task(f"good {number}", (number,)) for number in range(4)]
     bad = DYING.task("bad", ())
     below = TOTAL.task("below", (), one=bad, other=good[0])
-    outcome = execute([good[0], bad, below, *good[1:]], store, 2)
+    worse = DYING.task("worse", (1,))
+    outcome = execute([bad, *good[:2], worse, below, *good[2:]], store, 2)
     assert set(outcome.computed) == {task.key for task in good}
-    assert set(outcome.failed) == {bad.key, below.key}
-    for error in outcome.failed.values():
+    assert set(outcome.failed) == {bad.key, worse.key, below.key}
+    for key, error in outcome.failed.items():
         assert isinstance(error, AnalysisError)
-        assert str(error).startswith("Dying: bad: a worker process ended before its work was done, and again")
+        whose = "worse" if key == worse.key else "bad"
+        assert str(error).startswith(f"Dying: {whose}: a worker process ended before its work was done, and again")
 
 
 def test_a_task_whose_worker_dies_of_something_else_is_computed_after_all(store, tmp_path):
