@@ -82,7 +82,8 @@ CALLS_NOT_IN_THE_CORE = frozenset({"open", "print", "input"})
 
 HEAVY = frozenset(
     {"h5py", "librosa", "lmfit", "matplotlib", "ngsolve", "numba", "pandas", "plotly", "pyoctaveband", "pyuff"}
-    | {"aiohttp", "asammdf", "dask", "defusedxml", "distributed", "dwdatareader", "nptdms", "pyarrow", "scipy", "soundfile"}
+    | {"aiohttp", "asammdf", "dask", "defusedxml", "distributed", "dwdatareader", "nptdms", "pyarrow", "scipy"}
+    | {"soundfile"}
 )
 
 

@@ -51,7 +51,8 @@ def shared_tasks(campaign: Campaign, several: SeveralLogs, store: Store) -> dict
             columns[reference], columns[index], run.max_offset_s, centre_s if run.max_offset_s is not None else 0.0
         )
         logs = hashed_logs(run, several.logs, store)
-        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=(logs[reference], logs[index]))
+        pair = (logs[reference], logs[index])
+        found[index] = CLOCK.task(f"run {run.name}, {several.name(index)}", settings, logs=pair)
     return found
 
 
