@@ -128,7 +128,7 @@ class Cluster:
         except TdacousticError as error:
             answer.set_exception(error)
         except Exception as error:
-            if self._is_connected():
+            if self._is_connected() and not _is_of_the_line(error):
                 raise
             answer.set_exception(BrokenExecutor(str(error)))
         return answer
@@ -206,7 +206,7 @@ class Cluster:
                 f"{whose}: {error.allowed_failures + 1} workers ended while they worked on it, the last one "
                 f"{error.last_worker.address}: too little memory, or a library that crashes; the others go on"
             )
-        if isinstance(error, CancelledError) or not self._is_connected():
+        if isinstance(error, CancelledError) or _is_of_the_line(error) or not self._is_connected():
             return BrokenExecutor(str(error))
         if isinstance(error, ImportError | AttributeError) and self._link is not None:
             with suppress(Exception):
@@ -214,6 +214,13 @@ class Cluster:
                 if problem is not None:
                     return AnalysisError(f"{whose}: {problem}")
         return error
+
+
+def _is_of_the_line(error: BaseException) -> bool:
+    """Whether the connection broke: dask's client notices a moment later."""
+    from distributed.comm import CommClosedError
+
+    return isinstance(error, CommClosedError)
 
 
 def _bytes_of(task: Task, store: Store) -> bytes:
