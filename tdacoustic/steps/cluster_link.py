@@ -90,7 +90,8 @@ def _connected(address: str) -> Any:
             "pip install 'tdacoustic[cluster]'"
         ) from error
     _check_address(address)  # a client that fails while it is made leaves dask's own thread in disorder
-    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # its traces of a lost scheduler: we say it
+    for name in ("client", "batched", "core", "comm"):  # their traces of a lost scheduler: we say it
+        logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     try:
         return Client(address, timeout=_CONNECT_S, set_as_default=False, name="tdacoustic")
     except Exception as error:
