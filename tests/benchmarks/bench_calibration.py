@@ -45,7 +45,7 @@ sys.path[:0] = [str(TESTS / "evidence"), str(TESTS / "gears")]
 
 import drive_levels as plain
 from calibration_study import BEARINGS, CONSTANT, DAMPING, GAIN, Truth
-from figures import note
+from figures import note, processor
 from printed_equations import direction, rates
 
 import tdacoustic as td
@@ -289,17 +289,12 @@ def _short(key: str) -> str:
 def main(repeats: int = 7) -> None:
     """Print the tables."""
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba", "lmfit"))
-    cpu = next((line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if "model name" in line), "")
     print(f"Medians of {repeats} calls, the first not counted; one core of {os.cpu_count()}")
-    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {cpu}\n")
+    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {processor()}\n")
     levels_db = plain.levels_at_4_m_db(TRUTH.drive())
     against_rk45(repeats, levels_db)
     growth(repeats)
     prediction(repeats)
-
-
-def _lines(path: str) -> list[str]:
-    return Path(path).read_text(encoding="utf-8").splitlines() if Path(path).exists() else []
 
 
 if __name__ == "__main__":

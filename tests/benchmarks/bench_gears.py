@@ -34,7 +34,7 @@ from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "gears"))
 
-from figures import note
+from figures import note, processor
 from reference_drive import RATED_TORQUE_N_M, reference_system
 
 from tdacoustic.gears import GearSystem, SteadyState, steady_state
@@ -251,17 +251,12 @@ def with_separation() -> None:
 def main(repeats: int = 20) -> None:
     """Print the tables."""
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba"))
-    cpu = next((line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if "model name" in line), "")
     print(f"Reference drive; medians of {repeats} calls and more; one core of {os.cpu_count()}")
-    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {cpu}\n")
+    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {processor()}\n")
     cases = [Case.of(name, *condition) for name, condition in CASES.items()]
     against_scipy(cases, repeats)
     over_harmonics(cases, repeats)
     with_separation()
-
-
-def _lines(path: str) -> list[str]:
-    return Path(path).read_text(encoding="utf-8").splitlines() if Path(path).exists() else []
 
 
 if __name__ == "__main__":

@@ -36,7 +36,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "evidence"))
 
 import radiation_study as study
-from figures import note
+from figures import note, processor
 from radiation_cases import BOX_M, FAR, HALF_WAVES, IMPEDANCE_PA_S_M, PANELS, Case, plate, receivers
 
 from tdacoustic.radiation.boundary_elements import ExteriorProblem
@@ -156,17 +156,12 @@ PARTS: tuple[Callable[[int], None], ...] = (against_other_codes,)
 def main(repeats: int = 3) -> None:
     """Print the tables."""
     libraries = ", ".join(f"{name} {version(name)}" for name in ("numpy", "scipy", "numba", "bempp-cl", "ngsolve"))
-    cpu = next((line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if "model name" in line), "")
     threads = os.environ["NUMBA_NUM_THREADS"]
     print(f"Ours: medians of {repeats} calls; other codes once; {threads} thread(s) of {os.cpu_count()} cores")
     print(f"load {os.getloadavg()[0]:.1f} at the start")
-    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {cpu}")
+    print(f"Python {platform.python_version()}, {libraries}; {platform.machine()} {processor()}")
     for part in PARTS:
         part(repeats)
-
-
-def _lines(path: str) -> list[str]:
-    return Path(path).read_text(encoding="utf-8").splitlines() if Path(path).exists() else []
 
 
 if __name__ == "__main__":

@@ -21,11 +21,11 @@ import sys
 import tempfile
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-__all__ = ["Figure", "note"]
+__all__ = ["Figure", "note", "processor"]
 
 HERE = Path(__file__).resolve().parent
 NOTES = "TDACOUSTIC_FIGURES"
@@ -110,15 +110,12 @@ def note(
     path = os.environ.get(NOTES)
     if path is None:
         return
-    lowest = highest = ratio = None
-    if ratios:
-        held = sorted(ratios)
-        lowest, ratio, highest = held[0], held[len(held) // 2], held[-1]
-    figure = Figure(what, ours, unit, against, theirs, ratio, lowest, highest, budget)
-    if ratio is None and theirs is not None:
-        figure = Figure(
-            what, ours, unit, against, theirs, ours / theirs if figure.is_rate else theirs / ours, budget=budget
-        )
+    figure = Figure(what, ours, unit, against, theirs, budget=budget)
+    held = sorted(ratios)
+    if held:
+        figure = replace(figure, ratio=held[len(held) // 2], lowest=held[0], highest=held[-1])
+    elif theirs is not None:
+        figure = replace(figure, ratio=ours / theirs if figure.is_rate else theirs / ours)
     with Path(path).open("a", encoding="utf-8") as stream:
         stream.write(json.dumps(asdict(figure), ensure_ascii=False) + "\n")
 
@@ -142,13 +139,17 @@ def run_benchmark(script: Path, log: Path) -> tuple[list[Figure], str, float]:
     return [Figure(**json.loads(line)) for line in lines], failed, took
 
 
+def processor() -> str:
+    """Return the name of the processor, empty where the system does not tell."""
+    return next((line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if "model name" in line), "")
+
+
 def machine() -> list[str]:
     """Return lines on machine and versions."""
-    cpu = next((line.split(":")[1].strip() for line in _lines("/proc/cpuinfo") if "model name" in line), "")
     memory = next((int(line.split()[1]) / 2**20 for line in _lines("/proc/meminfo") if "MemTotal" in line), None)
     held = f"{memory:.0f} GiB" if memory else "memory unknown"
     return [
-        f"{platform.system()} {platform.machine()} {cpu}, {os.cpu_count()} cores, {held}; commit {_commit()}",
+        f"{platform.system()} {platform.machine()} {processor()}, {os.cpu_count()} cores, {held}; commit {_commit()}",
         f"Python {platform.python_version()}, {_versions(LIBRARIES)}",
         f"beside: {_versions(RIVALS)}",
     ]
