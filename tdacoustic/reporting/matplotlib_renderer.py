@@ -233,7 +233,8 @@ def _draw_labels(canvas: MatplotlibFigure, axes: Axes, figure: Figure) -> None:
             ]
     if not found:
         return
-    canvas.draw_without_rendering()
+    canvas.get_layout_engine().execute(canvas)  # type: ignore[union-attr]
+    axes.apply_aspect()
     canvas.set_layout_engine("none")
     box = axes.get_window_extent()
     points = canvas.dpi / 72
@@ -312,8 +313,8 @@ def _png(canvas: MatplotlibFigure, dpi: int, colours: int | None = None) -> byte
     canvas.set_facecolor("white")
     canvas.canvas.draw()  # `savefig` draws twice, and packs a picture that would only be unpacked again
     with Image.fromarray(np.asarray(canvas.canvas.buffer_rgba())) as image:  # type: ignore[attr-defined]
-        small = image.convert("RGB").quantize(colours, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    small.save(packed, format="png", optimize=True)
+        small = image.convert("RGB").quantize(colours, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+    small.save(packed, format="png", compress_level=6)  # `optimize` takes six times as long for a tenth of the bytes
     return packed.getvalue()
 
 

@@ -15,6 +15,7 @@ from tdacoustic.steps.cluster_check import asked, package_problem
 from tdacoustic.steps.cluster_link import Link, forget, link_to
 from tdacoustic.steps.cluster_worker import Call, Reply, SharedStore, awaited
 from tdacoustic.steps.computation import compute
+from tdacoustic.steps.executor import SuspectedError
 from tdacoustic.steps.software import own_software
 from tdacoustic.steps.store import Store
 from tdacoustic.steps.task import Task
@@ -37,7 +38,8 @@ class Cluster:
     travel. Logs are read where they lie: on a file system that every worker sees under the same path, or fetched by
     each worker where the campaign names a URL.
 
-    A worker that dies is dask's affair: its tasks are given to others. A task that several workers died of fails.
+    A worker that dies is dask's affair: its tasks are given to others. A task that several workers died of fails; where
+    there are more of them, each is tried once more, alone.
 
     For ``tls://`` addresses certificates come from dask's own configuration (``distributed.comm.tls``). Dask's
     messages hold pickles, which run code where they are opened: scheduler and workers have to be trusted, and their
@@ -202,7 +204,7 @@ class Cluster:
         if isinstance(error, TdacousticError):
             return error
         if isinstance(error, KilledWorker):
-            return AnalysisError(
+            return SuspectedError(
                 f"{whose}: {error.allowed_failures + 1} workers ended while they worked on it, the last one "
                 f"{error.last_worker.address}: too little memory, or a library that crashes; the others go on"
             )

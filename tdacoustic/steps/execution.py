@@ -9,7 +9,7 @@ from functools import partial
 
 from tdacoustic.errors import AnalysisError, TdacousticError
 from tdacoustic.steps.computation import compute, result_of
-from tdacoustic.steps.executor import Executor, Inline, Jobs
+from tdacoustic.steps.executor import Executor, Inline, Jobs, SuspectedError
 from tdacoustic.steps.ledger import Ledger, Outcome, Progress, in_order
 from tdacoustic.steps.processes import Processes
 from tdacoustic.steps.progress import listening
@@ -65,28 +65,41 @@ def _executor(jobs: Jobs, n_waiting: int) -> Executor:
 
 
 def _drive(ledger: Ledger, store: Store, executor: Executor) -> None:
-    """Keep the executor's slots full until nothing waits."""
+    """Compute until nothing waits; of several tasks that are suspected each is tried once more, alone."""
+    while suspected := _driven(ledger, store, executor):
+        if len(suspected) == 1:
+            ledger.finish(*suspected[0])
+        else:
+            _one_by_one(ledger, [task for task, _ in suspected], store, executor)
+
+
+def _driven(ledger: Ledger, store: Store, executor: Executor) -> list[tuple[Task, SuspectedError]]:
+    """Keep the executor's slots full until nothing is ready; return the tasks that are suspected."""
     queue: deque[Task] = deque()
     running: dict[Future[str], Task] = {}
+    suspected: list[tuple[Task, SuspectedError]] = []
     while True:
         queue.extend(ledger.ready())
         while queue and len(running) < executor.n_slots:
             task = queue.popleft()
             running[_submit(ledger, task, store, executor)] = task
         if not running:
-            return
+            return suspected
         done = _finished(running, executor)
         if any(_is_broken(future) for future in done):
-            done = wait(running).done  # all that was in flight has broken with it, or was done just before
-        suspects = []
+            done = wait(running).done  # what is tried again is tried alone
+        broken = []
         for future in [future for future in running if future in done]:
-            task = running.pop(future)
+            task, error = running.pop(future), future.exception()
             if _is_broken(future):
-                suspects.append(task)
+                broken.append(task)
+            elif isinstance(error, SuspectedError):
+                suspected.append((task, error))
             else:
                 _finish(ledger, task, future)
-        if suspects:
-            _one_by_one(ledger, suspects, store, executor)
+        if broken:
+            executor.renew()
+            _one_by_one(ledger, broken, store, executor)
 
 
 def _submit(ledger: Ledger, task: Task, store: Store, executor: Executor) -> Future[str]:
@@ -113,9 +126,9 @@ def _finish(ledger: Ledger, task: Task, future: Future[str]) -> None:
 
 def _one_by_one(ledger: Ledger, suspects: Sequence[Task], store: Store, executor: Executor) -> None:
     """Compute the tasks of which one ended its process; the one that does so alone fails."""
-    executor.renew()
     for task in suspects:
         future = _submit(ledger, task, store, executor)
+        _finished({future: task}, executor)
         if _is_broken(future):
             ledger.finish(task, AnalysisError(f"{task.step.title}: {task.label}: {WORKER_LOST}"))
             executor.renew()

@@ -6,13 +6,17 @@ from concurrent.futures import Future
 from types import TracebackType
 from typing import Protocol, TypeAlias
 
-from tdacoustic.errors import TdacousticError
+from tdacoustic.errors import AnalysisError, TdacousticError
 from tdacoustic.steps.computation import compute
 from tdacoustic.steps.progress import tell_progress
 from tdacoustic.steps.store import Store
 from tdacoustic.steps.task import Task
 
-__all__ = ["Executor", "Inline", "Jobs"]
+__all__ = ["Executor", "Inline", "Jobs", "SuspectedError"]
+
+
+class SuspectedError(AnalysisError):
+    """Workers ended while they worked on a task: it ended them, or one that was beside it did."""
 
 
 class Executor(Protocol):
@@ -30,8 +34,9 @@ class Executor(Protocol):
         """Start a task whose inputs the store holds.
 
         The future's result is the key, whose result the store then holds. Its exception is the task's own
-        `TdacousticError`, a `concurrent.futures.BrokenExecutor` where the process that worked on it ended (all tasks
-        in flight then have it, and `renew` is called), or a defect.
+        `TdacousticError`, a `concurrent.futures.BrokenExecutor` where the process that worked on it ended (`renew` is
+        then called, when nothing is in flight any more), a `SuspectedError` where the executor went on by itself, or a
+        defect.
         """
         ...
 

@@ -1,4 +1,4 @@
-"""A pool of spawned processes on this machine."""
+"""Spawned processes on this machine."""
 
 from __future__ import annotations
 
@@ -6,26 +6,77 @@ import multiprocessing
 import os
 import signal
 import threading
-from concurrent.futures import Future, ProcessPoolExecutor
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
 from multiprocessing.process import BaseProcess
 from types import TracebackType
-from typing import Any
+from typing import Any, Final, ParamSpec, TypeVar
 
 from tdacoustic.errors import ExecutorError
 from tdacoustic.steps.computation import compute
 from tdacoustic.steps.store import Store
 from tdacoustic.steps.task import Task
 
-__all__ = ["NO_WORKERS", "THREAD_VARIABLES", "Processes", "start_worker"]
+__all__ = ["NO_WORKERS", "Processes", "WorkerProcess"]
 
-NO_WORKERS = (
+NO_WORKERS: Final = (
     "worker processes end before they take any work: too little memory, or a script that lacks "
     '`if __name__ == "__main__":`; what is done is kept, --jobs 1 (jobs=1) goes on without worker processes'
 )
 
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+THREAD_VARIABLES: Final = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 """What libraries take their number of threads from."""
+
+P = ParamSpec("P")
+T = TypeVar("T")
+
+
+class WorkerProcess:
+    """One process that takes one call after the other; after it left, the next call starts another.
+
+    A pool of one process, and one call at a time: Python's pools of several (3.11 to 3.13) wait for ever where one
+    process ends while another is being started, and a process that ends takes what the others work on along.
+
+    Parameters
+    ----------
+    most : int, optional
+        Calls, after which the process is replaced.
+    """
+
+    def __init__(self, most: int | None = None) -> None:
+        self._most = most
+        self._pool: ProcessPoolExecutor | None = None
+        self._last: Future[Any] | None = None
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is being worked on."""
+        return self._last is None or self._last.done()
+
+    def submit(self, call: Callable[P, T], /, *args: P.args, **kwargs: P.kwargs) -> Future[T]:
+        """Hand a call to the process, which has to be idle; one that ended while it was idle is replaced."""
+        with _of_workers():
+            try:
+                future = self._started().submit(call, *args, **kwargs)
+            except BrokenProcessPool:
+                self.leave()
+                future = self._started().submit(call, *args, **kwargs)
+        self._last = future
+        return future
+
+    def _started(self) -> ProcessPoolExecutor:
+        if self._pool is None:
+            context = multiprocessing.get_context("spawn")
+            self._pool = ProcessPoolExecutor(1, context, _start, max_tasks_per_child=self._most)
+        return self._pool
+
+    def leave(self) -> None:
+        """Let the process end, and wait until it has."""
+        if self._pool is not None:
+            self._pool.shutdown(cancel_futures=True)
+            self._pool = None
 
 
 class Processes:
@@ -37,68 +88,69 @@ class Processes:
     """
 
     def __init__(self, n_processes: int) -> None:
-        self._n_processes = n_processes
-        self.n_slots = n_processes + 1  # one at hand, so that nobody waits
-        self._pool: ProcessPoolExecutor | None = None
+        self.n_slots = n_processes
+        self._workers = [WorkerProcess() for _ in range(n_processes)]
         self._others: set[BaseProcess] = set()
 
     def submit(self, task: Task, store: Store) -> Future[str]:
-        """Hand a task to the pool."""
-        if self._pool is None:
-            self._pool = self._started()
-        try:
-            return self._pool.submit(compute, task, store)
-        except BrokenProcessPool as error:  # an idle worker ended: it is said as of one that worked
-            broken: Future[str] = Future()
-            broken.set_exception(error)
-            return broken
+        """Hand a task to an idle process."""
+        return next(worker for worker in self._workers if worker.is_idle).submit(compute, task, store)
 
     def renew(self) -> None:
-        """Start a new pool.
+        """Try whether a process takes work; those that ended are replaced when they are next needed.
 
         Raises
         ------
         ExecutorError
-            Its workers do not even start.
+            Workers do not even start.
         """
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-        self._pool = self._started()
+        worker = self._workers[0]
+        worker.leave()
         try:
-            self._pool.submit(os.getpid).result()
-        except BrokenProcessPool as broken:
+            worker.submit(os.getpid).result()
+        except BrokenExecutor as broken:
             raise ExecutorError(NO_WORKERS) from broken
 
     def look(self) -> None:
         """A worker that ends is heard of at once."""
 
-    def _started(self) -> ProcessPoolExecutor:
-        # workers begin in the working directory, which may be a folder from outside: none of its modules are theirs
-        os.environ.setdefault("PYTHONSAFEPATH", "1")
-        context = multiprocessing.get_context("spawn")
-        return ProcessPoolExecutor(self._n_processes, mp_context=context, initializer=start_worker)
-
     def __enter__(self) -> Processes:
-        """Remember which processes are not its own; the pool starts with the first task."""
+        """Remember which processes are not its own; each starts with its first task."""
         self._others = set(multiprocessing.active_children())
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None, /
     ) -> None:
-        """End the pool; after a defect or Ctrl-C at once: nobody waits for what is still running."""
+        """End the processes; after a defect or Ctrl-C at once: nobody waits for what is still running."""
         if kind is not None:
             for process in set(multiprocessing.active_children()) - self._others:
                 process.terminate()
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-            self._pool = None
+        for worker in self._workers:
+            worker.leave()
 
 
-def start_worker() -> None:
-    """Set up a worker: one thread a library, Ctrl-C left to the parent, and no life beyond the parent's."""
-    for name in THREAD_VARIABLES:
-        os.environ[name] = "1"
+@contextmanager
+def _of_workers() -> Iterator[None]:
+    """Let what starts inside begin with one thread a library, and without modules of the working directory.
+
+    The working directory may be a folder from outside: none of its modules are theirs.
+    """
+    wanted = {**dict.fromkeys(THREAD_VARIABLES, "1"), "PYTHONSAFEPATH": "1"}
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
+
+
+def _start() -> None:
+    """Set up a worker: Ctrl-C is left to the parent, and it does not outlive it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
     if parent is not None:

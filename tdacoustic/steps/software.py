@@ -14,12 +14,13 @@ __all__ = ["own_software", "source_sha256"]
 
 @cache
 def source_sha256() -> str:
-    """SHA-256 over the Python files of this package, whatever their ends of line; some 20 ms once a process."""
+    """SHA-256 over the files of this package, whatever their ends of line; some 20 ms once a process."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
-    for path in sorted(package.rglob("*.py")):
-        content = path.read_bytes().replace(b"\r\n", b"\n")
-        digest.update(f"{path.relative_to(package).as_posix()} {len(content)}\n".encode() + content)
+    for path in sorted(package.rglob("*")):  # templates, styles and scripts of the report too
+        if path.is_file() and "__pycache__" not in path.parts:
+            content = path.read_bytes().replace(b"\r\n", b"\n")
+            digest.update(f"{path.relative_to(package).as_posix()} {len(content)}\n".encode() + content)
     return digest.hexdigest()
 
 

@@ -12,6 +12,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from typing import Any, BinaryIO
 from uuid import uuid4
@@ -214,8 +215,9 @@ def _check_whole(key: str, data: bytes) -> None:
         raise StoreError(f"{key}: these {len(data)} bytes are no whole result ({error})") from error
 
 
+@cache
 def _sweep(folder: Path) -> None:
-    """Take away the temporary files that killed processes left long ago."""
+    """Take away the temporary files that killed processes left long ago; once a process."""
     for temporary in folder.glob("*.tmp"):
         with suppress(OSError):
             if time.time() - temporary.stat().st_mtime > _LEFT_OVER_S:

@@ -1,6 +1,6 @@
 """Worker processes that work through many campaigns, each one campaign at a time.
 
-Each worker is an executor of one process, so that a worker that dies takes no other along and it is known what it was
+Each worker is a process of its own, so that a worker that dies takes no other along and it is known what it was
 working on. A campaign whose worker died is tried once more, alone, when all others are done.
 
 Memory is bounded at two places: as many workers start as fit into the memory that is free, at `WORKER_BYTES` each; and
@@ -14,13 +14,11 @@ import multiprocessing
 import os
 from collections import deque
 from collections.abc import Callable, Generator, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Future, wait
 from multiprocessing.process import BaseProcess
 from typing import Final
 
-from tdacoustic.steps.processes import THREAD_VARIABLES, start_worker
+from tdacoustic.steps.processes import WorkerProcess
 from tdacoustic.workflows.memory import can_measure_memory, free_memory_bytes
 from tdacoustic.workflows.run_many_work import CampaignJob, CampaignReport, Told, failed_by_defect, work
 
@@ -119,22 +117,24 @@ class _Crew:
     """Some workers, started when there is work for them."""
 
     def __init__(self, n: int, task: Work) -> None:
-        self._idle = [_Worker(task) for _ in range(n)]
+        most = None if can_measure_memory() else CAMPAIGNS_UNMEASURED
+        self._task = task
+        self._idle = [WorkerProcess(most) for _ in range(n)]
 
     def work(self, jobs: Sequence[CampaignJob], tell: Tell) -> Iterator[tuple[CampaignJob, CampaignReport | None]]:
         """Yield each job with its report, or None where its worker died."""
         waiting = deque(jobs)
-        running: dict[Future[CampaignReport], tuple[_Worker, CampaignJob]] = {}
+        running: dict[Future[CampaignReport], tuple[WorkerProcess, CampaignJob]] = {}
         while waiting or running:
             while waiting and self._idle:
                 worker, job = self._idle.pop(), waiting.popleft()
-                running[worker.submit(job)] = worker, job
+                running[worker.submit(self._task, job)] = worker, job
             tell([job for _, job in running.values()])
             for future in wait(running, return_when=FIRST_COMPLETED).done:
                 worker, job = running.pop(future)
                 try:
                     report = future.result()
-                except BrokenProcessPool:
+                except BrokenExecutor:
                     report = None
                 except Exception as error:  # what it told could not be understood
                     report = CampaignReport(failed_by_defect(error))
@@ -147,49 +147,3 @@ class _Crew:
         """Wait until all workers have ended."""
         for worker in self._idle:
             worker.leave()
-
-
-class _Worker:
-    """One process that takes one campaign after the other; after it left, the next campaign starts another."""
-
-    def __init__(self, task: Work) -> None:
-        self._task = task
-        self._pool: ProcessPoolExecutor | None = None
-
-    def submit(self, job: CampaignJob) -> Future[CampaignReport]:
-        """Hand a campaign to the process; a process that ended while it was idle is replaced."""
-        with _one_thread_each():
-            try:
-                return self._started().submit(self._task, job)
-            except BrokenProcessPool:
-                self.leave()
-                return self._started().submit(self._task, job)
-
-    def _started(self) -> ProcessPoolExecutor:
-        if self._pool is None:
-            context = multiprocessing.get_context("spawn")
-            most = None if can_measure_memory() else CAMPAIGNS_UNMEASURED
-            self._pool = ProcessPoolExecutor(1, context, start_worker, max_tasks_per_child=most)
-        return self._pool
-
-    def leave(self) -> None:
-        """Let the process end, and wait until it has."""
-        if self._pool is not None:
-            self._pool.shutdown(cancel_futures=True)
-            self._pool = None
-
-
-@contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """Let what starts inside begin with one thread a library, and without modules of the working directory."""
-    wanted = {**dict.fromkeys(THREAD_VARIABLES, "1"), "PYTHONSAFEPATH": "1"}
-    before = {name: os.environ.get(name) for name in wanted}
-    os.environ.update(wanted)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

@@ -69,7 +69,7 @@ def run_into(
     result = run(campaign, tally, jobs, progress, fetch_urls=fetch_urls)
     write_run(result, folder, read)
     steps = {key for key, _ in result.records}
-    computed = tally.saved | (tally.absent & steps)
+    computed = tally.saved | {key for key in tally.absent if key in tally}
     return WrittenRun(result, len(computed), len(steps - computed))
 
 

@@ -58,10 +58,6 @@ def software() -> str:
     from tdacoustic.formats.table import ENTRY_POINTS
 
     digest = hashlib.sha256(source_sha256().encode())
-    package = Path(__file__).resolve().parents[1]
-    for path in sorted(package.rglob("*")):  # templates, styles and scripts of the report
-        if path.suffix not in (".py", ".pyc") and path.is_file():
-            digest.update(f"{path.relative_to(package).as_posix()} {_sha256(path)}\n".encode())
     for name, version in (*versions(), *_more_versions()):
         if name != "tdacoustic":  # its files tell more, and do so too where it is not installed
             digest.update(f"{name} {version}\n".encode())

@@ -36,7 +36,8 @@ def _measured_rows(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
         speed = f"{part['campaigns_a_minute']:g} campaigns or {part['runs_a_minute']:g} runs a minute"
         yield f"all of them, {words}", f"{part['first_s']:.1f} s: {speed}"
         yield f"a second call, {words}", f"{part['second_s']:.2f} s, {100 * part['second_of_first']:.2f} % of the first"
-        yield f"assembled again from the store, {words}", f"{part['again_s']:.1f} s"
+        if "again_s" in part:
+            yield f"assembled again from the store, {words}", f"{part['again_s']:.1f} s"
         peak = part["peak_mib"]
         worker, parent = max(peak.get("worker", [0])), max(peak.get("parent", [0]))
         yield f"most memory, {words}", f"a worker {worker} MiB, the parent {parent} MiB"
@@ -95,7 +96,7 @@ def _extrapolated_rows(record: dict[str, Any]) -> Iterator[tuple[str, str]]:
     yield "results in the store", f"{n_files:.2g} files, {n_files / 256:.0f} in each of its 256 folders"
     sweep = found["sweep"]
     sweep_ms = sweep["sweep_us"] / 1000 * n_files / 256 / sweep["names"]
-    yield "looking through one of these, once for each result kept", f"{sweep_ms:.1f} ms"
+    yield "looking through one of these, once a process and folder", f"{sweep_ms:.1f} ms"
     parent = max(part["peak_mib_of_second"] or [0]) + n_campaigns * found["book"]["bytes_of_one"] / 2**20
     yield "memory of the parent", f"{parent:.0f} MiB, {found['book']['bytes_of_one']} bytes a campaign"
 

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import Future
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from sample_steps import BROKEN, DYING, DYING_ONCE, FAILING, NUMBERS, TOTAL, log
 
 from tdacoustic.errors import AnalysisError
 from tdacoustic.steps import Store, execute, lineage, result_of
+from tdacoustic.steps.executor import Inline, SuspectedError
 
 HERE = Path(__file__).parent
 
@@ -93,9 +95,49 @@ def test_workers_that_cannot_even_start_are_one_clear_error(tmp_path):
     environment = {**os.environ, "PYTHONPATH": str(HERE.parents[1])}
     ended = subprocess.run([sys.executable, script], stderr=subprocess.PIPE, env=environment, timeout=60)
     assert ended.returncode == 1
-    last = ended.stderr.decode().strip().splitlines()[-1]
-    assert last.startswith("tdacoustic.errors.ExecutorError: worker processes end before they take any work")
-    assert 'if __name__ == "__main__":' in last
+    lines = ended.stderr.decode().splitlines()  # Python itself may warn after the last of ours
+    (said,) = [line for line in lines if line.startswith("tdacoustic.errors.ExecutorError: ")]
+    assert "worker processes end before they take any work" in said
+    assert 'if __name__ == "__main__":' in said
+
+
+class Suspecting(Inline):
+    """Suspects tasks by their labels, so many times each; takes all at once."""
+
+    n_slots = 9
+
+    def __init__(self, **times):
+        self.times = times
+
+    def submit(self, task, store):
+        if self.times.get(task.label, 0) < 1:
+            return super().submit(task, store)
+        self.times[task.label] -= 1
+        suspect = Future()
+        suspect.set_exception(SuspectedError(f"{task.label}: workers ended"))
+        return suspect
+
+
+def test_a_task_that_was_beside_a_deadly_one_is_tried_again_alone(store):
+    one, other, total = tree()
+    outcome = execute([total], store, Suspecting(one=1, other=1))
+    assert outcome.failed == {} and set(outcome.computed) == {one.key, other.key, total.key}
+
+
+def test_the_deadly_one_among_suspects_fails_with_what_rests_on_it(store):
+    one, other, total = tree()
+    outcome = execute([total], store, Suspecting(one=9, other=1))
+    assert set(outcome.computed) == {other.key}
+    assert {key: str(error) for key, error in outcome.failed.items()} == dict.fromkeys(
+        (one.key, total.key), "one: workers ended"
+    )
+
+
+def test_a_suspect_without_others_is_not_tried_again(store):
+    one, _, total = tree()
+    executor = Suspecting(one=9)
+    assert set(execute([total], store, executor).failed) == {one.key, total.key}
+    assert executor.times == {"one": 8}
 
 
 def test_a_pool_of_processes_gives_the_same_bytes(tmp_path):

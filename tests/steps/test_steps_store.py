@@ -330,8 +330,8 @@ def test_a_kill_while_saving_leaves_the_key_whole(tmp_path, store):
 
 
 def test_left_overs_of_a_kill_are_swept_when_they_are_old(store):
-    store.save(KEY, (1,), RECORD)
     folder = store._path(KEY).parent
+    folder.mkdir(parents=True)  # a process looks through it when it first keeps something there
     fresh, stale = folder / "x.tmp", folder / "y.tmp"
     fresh.touch()
     stale.touch()
