@@ -78,6 +78,7 @@ Scheduler = Annotated[
         show_default=False,
     ),
 ]
+Pdf = Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the report for paper.")]
 FetchUrls = Annotated[bool, typer.Option("--fetch-urls", help="Fetch logs that a campaign names by URL.")]
 Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone.")]
 
@@ -157,6 +158,13 @@ def _opened(campaign: Path, out: Path | None, overwrite: bool) -> tuple[LoadedCa
     loaded = load_campaign(campaign)
     target = out or default_output(_toml(campaign))
     return loaded, target, OutputFolder(target, _toml(campaign), overwrite)
+
+
+def _check_pdf(wanted: bool) -> None:
+    """Say before anything is computed that a PDF cannot be written."""
+    from tdacoustic.workflows.write import check_pdf
+
+    check_pdf(wanted)
 
 
 def _warn(problems: Iterable[str], quiet: bool) -> None:
@@ -247,14 +255,16 @@ def analyze(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     fetch_urls: FetchUrls = False,
+    pdf: Pdf = False,
     quiet: Quiet = False,
 ) -> None:
     """Analyse the logs of a campaign: levels, spectra, lines."""
     from tdacoustic.workflows.write import write_analysis
 
+    _check_pdf(pdf)
     loaded, target, folder = _opened(campaign, out, overwrite)
     analysis = _analysed(loaded, store, _executor(jobs, scheduler, quiet), quiet, fetch_urls)
-    write_analysis(analysis, folder, "analyze")
+    write_analysis(analysis, folder, "analyze", pdf)
     _warn(analysis.problems, quiet)
     if not quiet:
         print(target / "report.html")
@@ -270,6 +280,7 @@ def predict(
     store: StorePath = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
+    pdf: Pdf = False,
     quiet: Quiet = False,
 ) -> None:
     """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise, the housing and its sound."""
@@ -278,13 +289,14 @@ def predict(
     from tdacoustic.workflows.predict import predict as compute
     from tdacoustic.workflows.write import write_prediction
 
+    _check_pdf(pdf)
     loaded = load_fleet(fleet)  # a wrong fleet is said before anything else
     target = out or default_output(loaded.path)
     folder = OutputFolder(target, loaded.path, overwrite)
     executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
         result = compute(loaded, store, progress, jobs=executor)
-    write_prediction(result, folder)
+    write_prediction(result, folder, pdf)
     _warn(result.prediction.doubts, quiet)
     if not quiet:
         print(target / "report.html")
@@ -299,17 +311,19 @@ def calibrate(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     fetch_urls: FetchUrls = False,
+    pdf: Pdf = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit the model of a campaign's fleet to its measured levels."""
     from tdacoustic.workflows.calibrate import calibrate as compute
     from tdacoustic.workflows.write import write_calibration
 
+    _check_pdf(pdf)
     loaded, target, folder = _opened(campaign, out, overwrite)
     executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
         result = compute(loaded, store, executor, progress, fetch_urls=fetch_urls)
-    write_calibration(result, folder)
+    write_calibration(result, folder, pdf)
     _warn(result.calibration.doubts, quiet)
     if not quiet:
         print(target / "report.html")
@@ -324,6 +338,7 @@ def run(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     fetch_urls: FetchUrls = False,
+    pdf: Pdf = False,
     quiet: Quiet = False,
     list_file: Annotated[
         Path | None, typer.Option("--list", help="Campaigns too: a path or glob a line.", show_default=False)
@@ -337,11 +352,12 @@ def run(
 
     if not campaigns and list_file is None:
         raise typer.BadParameter("name a campaign, or a --list of them")
+    _check_pdf(pdf)
     listed = listed_campaigns(campaigns or (), list_file)
     if len(listed) == 1 and list_file is None:
-        _run_one(listed[0].file, out, overwrite, store, jobs, quiet, scheduler, fetch_urls)
+        _run_one(listed[0].file, out, overwrite, store, jobs, quiet, scheduler, fetch_urls, pdf)
     else:
-        _run_many(listed, out, overwrite, store, jobs, quiet, again, scheduler, fetch_urls)
+        _run_many(listed, out, overwrite, store, jobs, quiet, again, scheduler, fetch_urls, pdf)
 
 
 def _run_one(
@@ -353,6 +369,7 @@ def _run_one(
     quiet: bool,
     scheduler: str | None,
     fetch_urls: bool,
+    pdf: bool,
 ) -> None:
     from tdacoustic.workflows.run_one import run_into
     from tdacoustic.workflows.summary import run_lines
@@ -360,7 +377,7 @@ def _run_one(
     loaded, target, folder = _opened(campaign, out, overwrite)
     executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
-        result = run_into(loaded, folder, store, executor, progress, fetch_urls=fetch_urls).result
+        result = run_into(loaded, folder, store, executor, progress, fetch_urls=fetch_urls, pdf=pdf).result
     _warn((*result.problems, *result.doubts), quiet)
     if not quiet:
         for line in run_lines(result):
@@ -378,11 +395,12 @@ def _run_many(
     again: bool,
     scheduler: str | None,
     fetch_urls: bool,
+    pdf: bool,
 ) -> None:
     from tdacoustic.workflows.run_many import run_many
 
     start = time.monotonic()
-    how: dict[str, Any] = {"overwrite": overwrite, "again": again, "fetch_urls": fetch_urls}
+    how: dict[str, Any] = {"overwrite": overwrite, "again": again, "fetch_urls": fetch_urls, "pdf": pdf}
     how["inner"] = _cluster(scheduler, quiet)
     try:
         with _progress(quiet) as progress:
@@ -434,13 +452,14 @@ def fleet(
     check_all: Annotated[
         bool, typer.Option("--check-all", help="Check every file of a result, its report and arrays too.")
     ] = False,
+    pdf: Pdf = False,
     quiet: Quiet = False,
 ) -> None:
     """Gather the results of many campaigns: one dataset, one page, and what stands out."""
     from tdacoustic.workflows.fleet_view import fleet_view
 
     with _progress(quiet) as progress:
-        found = fleet_view(folders, out, overwrite, train_key, date_key, check_all, progress)
+        found = fleet_view(folders, out, overwrite, train_key, date_key, check_all, progress, pdf)
     left_out = [f"{each.folder} is left out: {each.reason}" for each in found.left_out]
     shown = left_out[:20]
     if len(left_out) > len(shown):

@@ -90,6 +90,10 @@ class RecipeError(TdacousticError, ValueError):
     """A synthesis recipe is wrong."""
 
 
+class TemplateError(TdacousticError, ValueError):
+    """A report template is no valid one."""
+
+
 class AnalysisError(TdacousticError, ValueError):
     """The data do not allow the analysis that was asked for."""
 

@@ -47,7 +47,7 @@ ALLOWED = {
     "sensors errors",
     "gathering": "tables errors",
     "reporting": "gathering studies results tables fitting drive gears attribution measured contributions orders tones "
-    "railway campaign sensors fleet quality lines spectra speed recording units errors __version__",
+    "railway campaign sensors fleet toml_models steps quality lines spectra speed recording units errors __version__",
     "synthesis": "errors",
     "workflows": "gathering studies reporting tables results fitting drive gears attribution measured contributions "
     "orders tones railway steps quality lines spectra speed ingest campaign sensors fleet toml_models formats "
@@ -83,7 +83,7 @@ CALLS_NOT_IN_THE_CORE = frozenset({"open", "print", "input"})
 HEAVY = frozenset(
     {"h5py", "librosa", "lmfit", "matplotlib", "ngsolve", "numba", "pandas", "plotly", "pyoctaveband", "pyuff"}
     | {"aiohttp", "asammdf", "dask", "defusedxml", "distributed", "dwdatareader", "nptdms", "pyarrow", "scipy"}
-    | {"soundfile"}
+    | {"reportlab", "soundfile"}
 )
 
 

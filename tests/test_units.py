@@ -18,18 +18,18 @@ from tdacoustic.units import (
 )
 
 DEFINITIONS = {  # spelling: (value in SI of 1 unit, SI symbol, source)
-    "g": (9.80665, "m/s^2", "CGPM 1901"),
-    "psi": (0.45359237 * 9.80665 / 0.0254**2, "Pa", "international pound and inch, 1959"),
-    "bar": (1e5, "Pa", "SI brochure, table 8"),
-    "mbar": (100.0, "Pa", "SI brochure, table 8"),
-    "rpm": (1.0 / 60.0, "1/s", "definition"),
-    "tr/min": (1.0 / 60.0, "1/s", "definition"),
-    "deg/s": (1.0 / 360.0, "1/s", "definition"),
-    "rad/s": (0.15915494309189535, "1/s", "definition"),
-    "km/h": (0.2777777777777778, "m/s", "definition"),
-    "m/s²": (1.0, "m/s^2", "SI"),
-    "kN m": (1000.0, "N m", "SI"),
-    "µPa": (1e-6, "Pa", "SI"),
+    "g": (9.80665, "m/s^2", "standard: 3rd CGPM (1901), standard acceleration of gravity"),
+    "psi": (0.45359237 * 9.80665 / 0.0254**2, "Pa", "standard: international yard and pound agreement (1959)"),
+    "bar": (1e5, "Pa", "standard: SI Brochure, 8th ed. (2006), table 8"),
+    "mbar": (100.0, "Pa", "standard: SI Brochure, 8th ed. (2006), table 8"),
+    "rpm": (1.0 / 60.0, "1/s", "analytic: one turn in 60 s"),
+    "tr/min": (1.0 / 60.0, "1/s", "analytic: one turn in 60 s"),
+    "deg/s": (1.0 / 360.0, "1/s", "analytic: one turn is 360 deg"),
+    "rad/s": (0.15915494309189535, "1/s", "analytic: one turn is 2 pi rad"),
+    "km/h": (0.2777777777777778, "m/s", "analytic: 1000 m in 3600 s"),
+    "m/s²": (1.0, "m/s^2", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
+    "kN m": (1000.0, "N m", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
+    "µPa": (1e-6, "Pa", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
 }
 
 
@@ -128,7 +128,9 @@ def test_levels_have_the_references_of_the_standard(conformance):
         ("acceleration", 1e-6, 0.0),
     ]:
         got = level_db(value, quantity)
-        conformance(f"level of {value:g} ({quantity})", expected, got, 1e-4, "dB", "ISO 1683")
+        conformance(
+            f"level of {value:g} ({quantity})", expected, got, 1e-4, "dB", "standard: ISO 1683:2015, reference values"
+        )
     assert reference_label("sound_pressure") == "20 uPa" and reference_label("torque") is None
 
 

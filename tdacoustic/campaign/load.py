@@ -84,6 +84,7 @@ def load_campaign(path: str | Path) -> Campaign:
         railway=file.railway,
         sensor_table=file.sensors,
         sensors=sensors,
+        template=file.template,
     )
     problems = contradictions(campaign)
     if problems:

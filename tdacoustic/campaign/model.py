@@ -36,6 +36,7 @@ class CampaignFile(Table):
     fleet: StatedPath | None = None
     runs: StatedPath | None = None
     sensors: StatedPath | None = None
+    template: StatedPath | None = None
     meta: dict[str, Any] = Field(default_factory=dict)
     channel: tuple[CampaignChannel, ...] = ()
     run: tuple[CampaignRun, ...] = ()
@@ -79,6 +80,8 @@ class Campaign:
         The ``sensors.csv`` that the sensitivities stand in.
     sensors : tuple of SensorEntry
         What it holds.
+    template : WrittenPath or None
+        Of the report. It need not exist.
     """
 
     path: Path
@@ -97,6 +100,7 @@ class Campaign:
     railway: RailwaySettings | None = None
     sensor_table: WrittenPath | None = None
     sensors: tuple[SensorEntry, ...] = ()
+    template: WrittenPath | None = None
 
     @property
     def folder(self) -> Path:

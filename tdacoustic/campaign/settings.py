@@ -52,6 +52,9 @@ class AnalysisSettings(Table):
     calibrators : str
         ``"check"``: calibrator runs set the scale of channels of which nobody states one, and check it elsewhere.
         ``"set"``: they set it everywhere.
+    sound_excerpts : bool
+        Whether the report holds a few seconds of a microphone's sound for each condition. Whoever spoke near it is
+        heard there.
     """
 
     orders: Annotated[tuple[Positive, ...], AfterValidator(each_once)] = ()
@@ -69,3 +72,4 @@ class AnalysisSettings(Table):
     motor_speed_range_rpm: Annotated[tuple[Positive, Positive], AfterValidator(ascending)] | None = None
     motor_speed_change_rpm_s: Positive | None = None
     calibrators: Literal["check", "set"] = "check"
+    sound_excerpts: bool = True

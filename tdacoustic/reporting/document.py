@@ -9,14 +9,18 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Final, Literal, TypeAlias, get_args
+
+import numpy as np
+from numpy.typing import NDArray
 
 from tdacoustic.reporting.figure import Figure, ReportError, check_slug
 
 __all__ = [
     "ORIGINS",
+    "Alternatives",
     "Block",
     "Cell",
     "Column",
@@ -25,12 +29,16 @@ __all__ = [
     "Fact",
     "Facts",
     "FigureBlock",
+    "House",
     "Link",
     "Notice",
     "Origin",
     "Paragraph",
     "Section",
     "Sentences",
+    "Sound",
+    "SoundStrip",
+    "SoundTrack",
     "Table",
     "walk",
 ]
@@ -266,6 +274,106 @@ class Details:
 
 
 @dataclass(frozen=True)
+class Alternatives:
+    """Blocks of the same kind for several channels or conditions, of which the reader has one at a time before them.
+
+    On paper, and where no scripts run, all are shown one after the other.
+
+    Parameters
+    ----------
+    label : str
+        What is chosen, ``"Channel"``.
+    views : sequence of (str, sequence of blocks)
+        Name of each choice, and what it shows; the first is shown at first.
+
+    Raises
+    ------
+    ReportError
+        There is no view, or two have the same name.
+    """
+
+    label: str
+    views: Sequence[tuple[str, Sequence[Block]]]
+
+    def __post_init__(self) -> None:
+        views = tuple((name, tuple(blocks)) for name, blocks in self.views)
+        if not views or len({name for name, _ in views}) < len(views):
+            raise ReportError(f"alternatives by {self.label!r} need views with different names")
+        object.__setattr__(self, "views", views)
+
+
+@dataclass(frozen=True)
+class SoundTrack:
+    """Something to play.
+
+    Parameters
+    ----------
+    label : str
+        ``"As recorded"``.
+    mp3 : bytes
+    text : str
+        What it is, with its level.
+    """
+
+    label: str
+    mp3: bytes
+    text: str = ""
+
+
+@dataclass(frozen=True)
+class SoundStrip:
+    """What sounds when, over frequency, and a line in it that is marked.
+
+    Parameters
+    ----------
+    level_db : ndarray, shape (n_frequencies, n_times)
+        From 0 Hz to `highest_hz`, and over the whole sound; re any reference.
+    duration_s, highest_hz : float
+    times_s, frequency_hz : sequence of float
+        The marked line; NaN where there is none, empty without one.
+    label : str
+        Name of the line.
+    """
+
+    level_db: NDArray[np.float64]
+    duration_s: float
+    highest_hz: float
+    times_s: Sequence[float] = ()
+    frequency_hz: Sequence[float] = ()
+    label: str = ""
+
+
+@dataclass(frozen=True)
+class Sound:
+    """Sounds of the same seconds, played in turn; a page keeps the place when the reader changes from one to another.
+
+    Parameters
+    ----------
+    name : str
+        Unique in a document; its anchor.
+    title, caption : str
+    tracks : sequence of SoundTrack
+        The first is the whole sound.
+    strip : SoundStrip or None
+    origin : str, optional
+    """
+
+    name: str
+    title: str
+    caption: str
+    tracks: Sequence[SoundTrack]
+    strip: SoundStrip | None = None
+    origin: Origin | None = None
+
+    def __post_init__(self) -> None:
+        check_slug(self.name, "name of a sound")
+        _check_origin(self.origin, f"sound {self.name!r}")
+        object.__setattr__(self, "tracks", tuple(self.tracks))
+        if not self.tracks:
+            raise ReportError(f"sound {self.name!r} has nothing to play")
+
+
+@dataclass(frozen=True)
 class Section:
     """A section with a heading; sections among its blocks are its subsections.
 
@@ -288,7 +396,30 @@ class Section:
         object.__setattr__(self, "blocks", tuple(self.blocks))
 
 
-Block: TypeAlias = Paragraph | Sentences | Notice | Facts | Table | FigureBlock | Details | Section
+Block: TypeAlias = (
+    Paragraph | Sentences | Notice | Facts | Table | FigureBlock | Sound | Details | Alternatives | Section
+)
+
+
+@dataclass(frozen=True)
+class House:
+    """Whose report it is: what stands above its title.
+
+    Parameters
+    ----------
+    company : str
+    lines : sequence of str
+        Department, address, number of the report.
+    logo : bytes
+        A picture; empty of none.
+    logo_type : str
+        ``"image/png"`` or ``"image/jpeg"``.
+    """
+
+    company: str = ""
+    lines: Sequence[str] = ()
+    logo: bytes = b""
+    logo_type: str = ""
 
 
 @dataclass(frozen=True)
@@ -311,6 +442,11 @@ class Document:
         Shown below the title: date, vehicle, program and its version.
     footer : sequence of str
         Lines at the end.
+    lineage : mapping of str to str
+        By the id of a section, the id of the one that tells how its numbers came about; it holds for the sections
+        inside too.
+    house : House, optional
+        Whose report it is.
 
     Raises
     ------
@@ -326,6 +462,8 @@ class Document:
     sections: Sequence[Section] = ()
     facts: Sequence[Fact | tuple[str, str] | tuple[str, str, Origin | None]] = ()
     footer: Sequence[str] = ()
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    house: House | None = None
 
     def __post_init__(self) -> None:
         if self.origin != "mixed":
@@ -336,7 +474,7 @@ class Document:
             if isinstance(value, str):
                 raise ReportError(f"{key} of a document must be a sequence, got text")
             object.__setattr__(self, key, tuple(value))
-        names: dict[str, list[str]] = {"section": ["summary"], "table": [], "figure": []}
+        names: dict[str, list[str]] = {"section": ["summary"], "table": [], "figure": [], "sound": []}
         for block in walk((*self.summary, *self.sections)):
             if isinstance(block, Section):
                 names["section"].append(block.id)
@@ -344,10 +482,15 @@ class Document:
                 names["table"].append(block.name)
             elif isinstance(block, FigureBlock):
                 names["figure"].append(block.figure.name)
+            elif isinstance(block, Sound):
+                names["sound"].append(block.name)
         for what, found in names.items():
             twice = sorted({name for name in found if found.count(name) > 1})
             if twice:
                 raise ReportError(f"two of the document's {what}s are named {', '.join(twice)}")
+        lost = sorted({*self.lineage.values()} - {*names["section"]})
+        if lost:
+            raise ReportError(f"the document has no section {', '.join(lost)} to tell how numbers came about")
 
 
 def walk(blocks: Sequence[Block]) -> Iterator[Block]:
@@ -356,3 +499,6 @@ def walk(blocks: Sequence[Block]) -> Iterator[Block]:
         yield block
         if isinstance(block, Section | Details):
             yield from walk(block.blocks)
+        elif isinstance(block, Alternatives):
+            for _, inside in block.views:
+                yield from walk(inside)

@@ -14,7 +14,7 @@ import gzip
 import hashlib
 import json
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
@@ -24,6 +24,7 @@ from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
 from tdacoustic.reporting.document import (
+    Alternatives,
     Block,
     Cell,
     Column,
@@ -31,11 +32,13 @@ from tdacoustic.reporting.document import (
     Document,
     Facts,
     FigureBlock,
+    House,
     Link,
     Notice,
     Paragraph,
     Section,
     Sentences,
+    Sound,
     Table,
     walk,
 )
@@ -44,6 +47,8 @@ from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
 from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
+from tdacoustic.reporting.shown import NOTICE_WORDS, ORIGIN_SENTENCES, cell_text
+from tdacoustic.reporting.sound_view import sound_view
 from tdacoustic.tables.writing import csv_cell
 
 __all__ = ["MAX_FIGURE_BYTES", "MAX_INTERACTIVE", "csv_cell", "render_html", "safe_json"]
@@ -52,17 +57,12 @@ MAX_INTERACTIVE: Final = 100
 """Figures of a page that can be zoomed; later ones are still pictures."""
 MAX_FIGURE_BYTES: Final = 12_000_000
 """Data of all figures of a page that can be zoomed."""
+MAX_PICTURE_BYTES: Final = 12_000_000
+"""Still pictures of a page, as text; later figures are left out, and the page says so in their places."""
+MAX_SOUND_BYTES: Final = 4_000_000
+"""Of all sounds of a page, as text."""
 STATIC_DPI: Final = 150
 
-_WORDS: Final = {"info": "Note", "warning": "Warning", "bad": "Problem", "synthetic": "Synthetic", "assumed": "Assumed"}
-_ORIGIN_WORDS: Final = {
-    "measured": "The data of this report were measured.",
-    "synthetic": "The data of this report were made by a program. They are not measurements.",
-    "printed": "The data of this report were taken from a publication.",
-    "assumed": "The data of this report are assumptions.",
-    "calculated": "The data of this report were calculated by a model. They are not measurements.",
-    "mixed": "The data of this report are of several origins. Each number says its own.",
-}
 _SOURCES: Final = frozenset({"motor", "gearbox", "undecided", "mixed"})
 """Sources that have a look of their own."""
 
@@ -99,16 +99,8 @@ def _script_hash(source: bytes) -> str:
 def _policy(script_hashes: Sequence[str]) -> str:
     return (
         f"default-src 'none'; script-src {' '.join(script_hashes)}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; base-uri 'none'; form-action 'none'"
+        "img-src data: blob:; media-src data:; base-uri 'none'; form-action 'none'"
     )
-
-
-def _number(value: float, digits: int | None) -> str:
-    """Write a number for reading, with a true minus sign."""
-    text = f"{value:.{digits}f}" if digits is not None else f"{value:.6g}"
-    if text.startswith("-") and not text.strip("-0."):
-        text = text[1:]
-    return text.replace("-", "\u2212")
 
 
 def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
@@ -116,22 +108,23 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     align = column.align or ("right" if column.kind == "number" else "left")
     tag = 'th scope="row"' if first and column.kind == "text" else "td"
     view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None, "href": None}
+    view["text"] = text = cell_text(column, cell)
     if cell is None:
-        return view | {"text": "\u2013" if column.kind == "number" else "", "raw": ""}
+        return view | {"raw": ""}
     if isinstance(cell, Link):
-        return view | {"text": cell.text, "href": cell.href, "raw": _raw(cell.text)}
+        return view | {"href": cell.href, "raw": _raw(cell.text)}
     if isinstance(cell, bool):
-        return view | {"text": "yes" if cell else "no", "raw": "true" if cell else "false"}
+        return view | {"raw": "true" if cell else "false"}
     if not isinstance(cell, str):
-        text, raw = _number(cell, column.digits), f"{cell:.9g}"
-        return view | {"text": text, "raw": None if raw == text else raw}
+        raw = f"{cell:.9g}"
+        return view | {"raw": None if raw == text else raw}
     if column.kind == "source" and cell:
         word = cell.split()[0].rstrip(",:")
         view["chip"] = f"source-{word if word in _SOURCES else 'other'}"
     if column.kind in ("origin", "verdict") and cell:
         known = column.kind == "origin" or cell in ("ok", "warning", "bad")
         view["chip"] = f"{column.kind}-{cell}" if known else "verdict-other"
-    return view | {"text": cell, "raw": _raw(cell)}
+    return view | {"raw": _raw(cell)}
 
 
 def _raw(text: str) -> str | None:
@@ -177,19 +170,32 @@ class _Views:
 
     max_interactive: int
     max_figure_bytes: int
+    max_picture_bytes: int
     figures: int = 0
+    picture_bytes: int = 0
+    left_out: int = 0
     tables: int = 0
+    sounds: int = 0
+    sound_bytes: int = 0
+    alternatives: int = 0
     interactive: int = 0
     figure_bytes: int = 0
     full: bool = False
+    lineage: Mapping[str, str] = field(default_factory=dict)
+    behind: str | None = None
     sections: list[dict[str, Any]] = field(default_factory=list)
 
     def figure(self, block: FigureBlock) -> dict[str, Any]:
         figure = block.figure
         self.figures += 1
+        if self.picture_bytes > self.max_picture_bytes:
+            self.left_out += 1
+            return {"type": "left_out", "number": self.figures, "name": figure.name, "title": figure.title.rstrip(".")}
         heat = any(isinstance(element, Heatmap) for element in figure.elements)
         png = render_png(figure, STATIC_DPI, colours=96 if heat else 48)
         width, height = _png_size(png)
+        packed = base64.b64encode(png).decode("ascii")
+        self.picture_bytes += len(packed)
         return {
             "type": "figure",
             "number": self.figures,
@@ -198,11 +204,12 @@ class _Views:
             "caption": figure.caption,
             "alt": f"{figure.title}: {figure.y_axis.caption} over {figure.x_axis.caption}",
             "origin": block.origin,
-            "png": Markup(base64.b64encode(png).decode("ascii")),
+            "png": Markup(packed),
             "width": width,
             "height": height,
             "narrow": figure_width(figure) if figure.equal else None,
             "reduced": is_reduced(figure),
+            "behind": self.behind,
             "json": self.payload(block),
         }
 
@@ -230,11 +237,20 @@ class _Views:
             return {"type": "facts", "pairs": block.pairs}
         if isinstance(block, FigureBlock):
             return self.figure(block)
+        if isinstance(block, Sound):
+            self.sounds += 1
+            self.sound_bytes, view = sound_view(block, self.sounds, self.sound_bytes, MAX_SOUND_BYTES)
+            return view | {"behind": self.behind}
         if isinstance(block, Table):
             self.tables += 1
-            return _table(block) | {"number": self.tables}
+            return _table(block) | {"number": self.tables, "behind": self.behind}
         if isinstance(block, Details):
             return {"type": "details", "summary": block.summary, "blocks": self.blocks(block.blocks, level, number)}
+        if isinstance(block, Alternatives):
+            self.alternatives += 1
+            number_here = self.alternatives
+            views = [(name, self.blocks(blocks, level, number)) for name, blocks in block.views]
+            return {"type": "alternatives", "label": block.label, "views": views, "number": number_here}
         return self.section(block, level, number)
 
     def blocks(self, blocks: Sequence[Block], level: int, number: str) -> list[dict[str, Any]]:
@@ -245,7 +261,9 @@ class _Views:
         return views
 
     def section(self, section: Section, level: int, number: str) -> dict[str, Any]:
+        outside, self.behind = self.behind, self.lineage.get(section.id, self.behind)
         blocks = self.blocks(section.blocks, level, number)
+        self.behind = outside
         return {
             "type": "section",
             "id": section.id,
@@ -257,6 +275,13 @@ class _Views:
         }
 
 
+def _house(house: House | None) -> dict[str, Any] | None:
+    if house is None or not (house.company or house.lines or house.logo):
+        return None
+    logo = f"data:{house.logo_type};base64,{base64.b64encode(house.logo).decode('ascii')}" if house.logo else ""
+    return {"company": house.company, "lines": house.lines, "logo": Markup(logo)}
+
+
 def _sections(document: Document, views: _Views) -> list[dict[str, Any]]:
     sections = []
     if document.summary:
@@ -266,7 +291,10 @@ def _sections(document: Document, views: _Views) -> list[dict[str, Any]]:
 
 
 def render_html(
-    document: Document, max_interactive: int = MAX_INTERACTIVE, max_figure_bytes: int = MAX_FIGURE_BYTES
+    document: Document,
+    max_interactive: int = MAX_INTERACTIVE,
+    max_figure_bytes: int = MAX_FIGURE_BYTES,
+    max_picture_bytes: int = MAX_PICTURE_BYTES,
 ) -> str:
     """Write a document as one HTML page that needs nothing else.
 
@@ -277,6 +305,8 @@ def render_html(
     max_interactive, max_figure_bytes : int
         How many figures, and how many bytes of their data, can be zoomed; the figures after
         that are still pictures, and the page says so.
+    max_picture_bytes : int
+        How many bytes still pictures may have; the figures after that are left out, and the page says so.
 
     Returns
     -------
@@ -290,12 +320,14 @@ def render_html(
     >>> "a &lt; b" in page
     True
     """
-    views = _Views(max_interactive, max_figure_bytes)
+    views = _Views(max_interactive, max_figure_bytes, max_picture_bytes, lineage=document.lineage)
     sections = _sections(document, views)
     if views.full:
         still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
         text = f"Of the {still} figures of this page the first {views.interactive} can be zoomed; "
         text += "the others are still pictures, which keeps the page small."
+        if views.left_out:
+            text += f" The last {views.left_out} are left out; what they show is in result.h5 and the tables."
         document_notices = (*document.notices, Notice("info", text))
     else:
         document_notices = tuple(document.notices)
@@ -313,10 +345,11 @@ def render_html(
             "facts": document.facts,
             "notices": document_notices,
             "footer": document.footer,
+            "house": _house(document.house),
         },
-        origin_words=_ORIGIN_WORDS[document.origin],
+        origin_words=ORIGIN_SENTENCES[document.origin],
         sections=sections,
-        words=_WORDS,
+        words=NOTICE_WORDS,
         policy=Markup(_policy(hashes)),
         css=Markup(f":root {{ {css_variables('light')} }}\n{dark}{_template('page.css')}"),
         js=Markup(script),

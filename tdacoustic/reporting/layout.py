@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import textwrap
+import unicodedata
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -19,6 +20,7 @@ __all__ = [
     "Placed",
     "axis_ranges",
     "cell_edges",
+    "cut_text",
     "figure_width",
     "label_heights",
     "log_ticks",
@@ -174,6 +176,22 @@ def wrapped(caption: str, room: float, char: float) -> list[str]:
     columns = max(12, int(room / char))
     parts = [caption] if len(caption) <= columns else caption.replace(" (", "\n(", 1).split("\n")
     return [line for part in parts for line in textwrap.wrap(part, columns, break_long_words=False)] or [""]
+
+
+def cut_text(text: str, columns: int) -> str:
+    """Return a text of at most so many columns, with a mark where it is cut; Chinese signs take two.
+
+    Examples
+    --------
+    >>> cut_text("a very long name of a channel", 12), cut_text("short", 12)
+    ('a very long…', 'short')
+    """
+    taken = 0
+    for place, sign in enumerate(text):
+        taken += 2 if unicodedata.east_asian_width(sign) in "WF" else 1
+        if taken > columns:
+            return f"{text[: place - 1]}…"
+    return text
 
 
 def label_heights(markers: Markers) -> FloatArray:

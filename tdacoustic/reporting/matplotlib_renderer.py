@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import math
+import warnings
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
@@ -21,6 +22,7 @@ from tdacoustic.reporting.layout import (
     Label,
     axis_ranges,
     cell_edges,
+    cut_text,
     figure_width,
     label_heights,
     log_ticks,
@@ -32,15 +34,20 @@ from tdacoustic.reporting.palette import colour
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.backend_bases import RendererBase
     from matplotlib.figure import Figure as MatplotlibFigure
 
-__all__ = ["plot", "render_png", "render_svg"]
+__all__ = ["draw_with", "is_thinned", "plot", "printed_size", "render_png", "render_svg"]
 
 WIDTH_IN: Final = 7.2
 """Width of a printed figure: the text width of a page of A4."""
 INCHES_PER_PIXEL: Final = WIDTH_IN / COLUMN_WIDTH
 """A figure as wide as the page's column is printed `WIDTH_IN` wide."""
 MAX_POINTS: Final = 6000
+MAX_CELLS: Final = (800, 500)
+"""Cells of a map along x and y; each shows the maximum of those it stands for."""
+_LONGEST_CATEGORY: Final = 48
+"""Columns of the name of a category or of a place along an axis; longer ones would leave no room for the plot."""
 
 _DASH: Final[dict[str, Any]] = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.8)), "steps": "-"}
 _SYMBOL: Final = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "cross": "+", "x": "x"}
@@ -148,7 +155,7 @@ def _draw_bars(axes: Axes, figure: Figure, inks: dict[int, str]) -> None:
 
 def _draw_heatmap(axes: Axes, figure: Figure, heat: Heatmap, coarse: bool) -> None:
     log_x, log_y = figure.x_axis.log, figure.y_axis.log
-    columns, rows = (300, 200) if coarse else (800, 500)
+    columns, rows = (300, 200) if coarse else MAX_CELLS
     x, y, z = block_max(heat.x, heat.y, heat.z, columns, rows, log_x, log_y)
     z = drawn(z, heat.z_axis.log)
     limits = drawn(np.array(heat.z_axis.limits), heat.z_axis.log) if heat.z_axis.limits else (None, None)
@@ -202,7 +209,7 @@ def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], r
             one.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
             one.set_minor_locator(NullLocator())
     if axis.names:
-        one.set_ticks(range(len(axis.names)), axis.names)
+        one.set_ticks(range(len(axis.names)), [cut_text(name, _LONGEST_CATEGORY) for name in axis.names])
     ends = tuple(10.0**end for end in limits) if axis.log else limits
     (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
     (axes.set_xlabel if which == "x" else axes.set_ylabel)("\n".join(wrapped(axis.caption, room, 4.3)))
@@ -213,6 +220,7 @@ def _set_legend(canvas: MatplotlibFigure, axes: Axes, width: float) -> None:
     if len(names) < 2:
         return
     room = width - 40
+    names = [cut_text(name, int((room - 34) / 4.6)) for name in names]
     widths = [len(name) * 4.2 + 34 for name in names]
     columns = max(1, min(len(names), int(room / max(widths))))
     canvas.legend(handles, names, loc="outside upper left", ncols=columns, handlelength=1.8, columnspacing=1.6)
@@ -265,6 +273,17 @@ def _draw_labels(canvas: MatplotlibFigure, axes: Axes, figure: Figure) -> None:
         )
 
 
+def printed_size(figure: Figure) -> tuple[float, float]:
+    """Return how wide and high a figure is printed, in points (1/72 inch): `WIDTH_IN` and what its height makes of it.
+
+    Parameters
+    ----------
+    figure : Figure
+    """
+    width, height = (72.0 * INCHES_PER_PIXEL * pixels for pixels in (figure_width(figure), figure.height))
+    return width, height
+
+
 def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure as MatplotlibFigure
@@ -275,7 +294,7 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
         def _repr_png_(self) -> bytes:
             return _png(self, 150)
 
-    width, height = (72.0 * INCHES_PER_PIXEL * pixels for pixels in (figure_width(figure), figure.height))
+    width, height = printed_size(figure)
     canvas = NotebookFigure(figsize=(width / 72.0, height / 72.0), layout="constrained")
     FigureCanvasAgg(canvas)
     canvas.get_layout_engine().set(w_pad=0.05, h_pad=0.04)  # type: ignore[union-attr, call-arg]
@@ -290,7 +309,8 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
     axes.grid(not heat, axis="y" if figure.categories else "both")
     if figure.categories:
         crowded = sum(len(name) + 2 for name in figure.categories) * 4.2 > width - 60
-        axes.set_xticks(range(len(figure.categories)), figure.categories, rotation=45 if crowded else 0)
+        names = [cut_text(name, _LONGEST_CATEGORY) for name in figure.categories]
+        axes.set_xticks(range(len(names)), names, rotation=45 if crowded else 0)
         axes.tick_params(axis="x", length=0)
         if crowded:
             for label in axes.get_xticklabels():
@@ -347,6 +367,44 @@ def render_svg(figure: Figure) -> str:
         canvas = _draw(figure, title=False)
         canvas.savefig(raw, format="svg", dpi=200, metadata={"Date": None, "Creator": None})
     return raw.getvalue().decode("utf-8")
+
+
+def is_thinned(figure: Figure) -> bool:
+    """Whether a figure is drawn with fewer points or cells than its data have; maxima are kept.
+
+    Parameters
+    ----------
+    figure : Figure
+    """
+    lines = any(isinstance(one, Line) and one.x.size > MAX_POINTS for one in figure.elements)
+    maps = [one for one in figure.elements if isinstance(one, Heatmap)]
+    return lines or any(one.x.size > MAX_CELLS[0] or one.y.size > MAX_CELLS[1] for one in maps)
+
+
+def draw_with(figure: Figure, renderer: RendererBase, dpi: int, lines: bool = True) -> None:
+    """Draw a figure with a renderer of matplotlib's whose pixels are points; maps reach it as pictures.
+
+    Parameters
+    ----------
+    figure : Figure
+    renderer : matplotlib.backend_bases.RendererBase
+        Of a canvas of `printed_size`.
+    dpi : int
+        Pixels an inch of these pictures.
+    lines : bool
+        Whether lines and bands reach it as such; else they are pictures too.
+    """
+    from matplotlib.backends.backend_mixed import MixedModeRenderer
+
+    with _style(), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # the renderer's own fonts may have it
+        canvas = _draw(figure, title=False)
+        for artist in () if lines else (*canvas.axes[0].lines, *canvas.axes[0].collections):
+            artist.set_rasterized(True)
+        canvas.set_dpi(72)
+        width, height = canvas.get_size_inches()
+        canvas.patch.set_visible(False)
+        canvas.draw(cast(Any, MixedModeRenderer(canvas, width, height, dpi, renderer)))
 
 
 def plot(figure: Figure, path: str | Path | None = None) -> MatplotlibFigure:

@@ -9,6 +9,8 @@ from tdacoustic.reporting.sections.clocks import clocks
 from tdacoustic.reporting.sections.contributions import contributions
 from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.levels import levels
+from tdacoustic.reporting.sections.lineage import lineage_sections
+from tdacoustic.reporting.sections.listening import listening
 from tdacoustic.reporting.sections.measured import measured
 from tdacoustic.reporting.sections.modes import modes
 from tdacoustic.reporting.sections.orders import orders
@@ -40,15 +42,18 @@ def measured_report(analysis: Analysis) -> Document:
     if campaign.origin == "synthetic":
         text = "Every number of this report comes from signals made by a program. Nothing in it was measured."
         notices.append(Notice("synthetic", text))
+    sections = measured_sections(analysis)
+    behind, lineage = lineage_sections(sections, analysis.records, analysis.inputs)
     return Document(
         title=campaign.name,
         subtitle="Noise and vibration of a traction drive: what the recordings show",
         origin=campaign.origin,
         summary=answer(analysis),
         notices=notices,
-        sections=[*measured_sections(analysis), provenance(analysis)],
+        sections=[*sections, provenance(analysis, behind)],
         facts=measured_facts(analysis),
         footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER],
+        lineage=lineage,
     )
 
 
@@ -78,6 +83,7 @@ def measured_sections(analysis: Analysis) -> list[Section]:
     beside = side_by_side(analysis)
     found = [
         beside,
+        listening(analysis),
         sources(analysis),
         contributions(analysis),
         modes(analysis),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Block, Document, Fact, Notice, Section, Sentences
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER, measured_facts, measured_sections
@@ -9,6 +11,8 @@ from tdacoustic.reporting.predicted_report import PREDICTED_FOOTER, predicted_se
 from tdacoustic.reporting.sections.calibration import calibration_section
 from tdacoustic.reporting.sections.gear_answer import gear_overview
 from tdacoustic.reporting.sections.gear_method import method_sections
+from tdacoustic.reporting.sections.lineage import lineage_sections
+from tdacoustic.reporting.sections.method import method_of_measurement
 from tdacoustic.reporting.sections.provenance import ASSUMPTIONS, inputs_of, settings_of, steps_of, versions_of
 from tdacoustic.reporting.sections.run_answer import run_answer
 from tdacoustic.results import CampaignResult
@@ -28,15 +32,18 @@ def run_report(result: CampaignResult) -> Document:
     campaign, analysis = result.campaign, result.analysis
     fleet = [] if analysis.fleet is None else [Fact("Fleet", analysis.fleet.name)]
     modelled = result.calibration is not None or result.prediction is not None
+    parts = _parts(result)
+    behind, lineage = _lineage(result, parts)
     return Document(
         title=campaign.name,
         subtitle=f"Noise and vibration of a traction drive: {_scope(result)}",
         origin=campaign.origin,
         summary=run_answer(result),
         notices=[Notice("synthetic", SYNTHETIC)] if campaign.origin == "synthetic" else [],
-        sections=_parts(result),
+        sections=[*parts, _provenance(result, behind)],
         facts=[*measured_facts(analysis), *fleet],
         footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER, *(PREDICTED_FOOTER if modelled else ())],
+        lineage=lineage,
     )
 
 
@@ -48,7 +55,7 @@ def _scope(result: CampaignResult) -> str:
 
 
 def _parts(result: CampaignResult) -> list[Section]:
-    """The body: a part each for recordings, calibration and prediction, and one on how the numbers came about."""
+    """The body: a part each for recordings, calibration and prediction."""
     heading = "What the recordings show" if result.campaign.runs else "The levels that are known"
     parts = [Section("recordings", heading, measured_sections(result.analysis))]
     if result.calibration is not None:
@@ -57,16 +64,28 @@ def _parts(result: CampaignResult) -> list[Section]:
     if result.prediction is not None:
         modelled = [gear_overview(result.prediction), *predicted_sections(result.prediction)]
         parts.append(Section("prediction", "What the model predicts", modelled))
-    return [*parts, _provenance(result)]
+    return parts
 
 
-def _provenance(result: CampaignResult) -> Section:
+def _lineage(result: CampaignResult, parts: Sequence[Section]) -> tuple[list[Block], dict[str, str]]:
+    """What stands behind each part; parts of the model without steps lead to the whole."""
+    of_model = {
+        "calibration": () if result.calibration is None else result.calibration.records,
+        "prediction": () if result.prediction is None else result.prediction.records,
+    }
+    behind, lineage = lineage_sections(parts, result.records, result.inputs, of_model)
+    return behind, {part.id: "provenance" for part in parts} | lineage
+
+
+def _provenance(result: CampaignResult, behind: Sequence[Block]) -> Section:
     """Inputs, settings, assumptions, methods, steps and versions, of all parts together."""
     blocks: list[Block] = [
         *inputs_of(result.inputs),
         settings_of(result.settings),
+        *method_of_measurement(result.analysis),
         Section("assumptions", "Assumptions on the recordings", [Sentences(ASSUMPTIONS)]),
         *(method_sections(result.prediction) if result.prediction is not None else ()),
+        *behind,
         *steps_of(result),
         versions_of(result.analysis.versions),
     ]

@@ -14,6 +14,7 @@ from tdacoustic.campaign import Campaign
 from tdacoustic.errors import AnalysisError
 from tdacoustic.fleet import Fleet
 from tdacoustic.measured import ChannelResult
+from tdacoustic.measured.listening import Listening
 from tdacoustic.measured.order_results import RunOrders
 from tdacoustic.measured.run_clocks import RunClocks
 from tdacoustic.measured.run_sensors import CampaignSensors
@@ -78,6 +79,8 @@ class Analysis:
         Scales from a sensor database and from calibrators, and what calibrators say of all scales.
     clocks : mapping of str to RunClocks
         By run of several logs, how their times lie on one axis.
+    listening : Listening or None
+        Excerpts of the sound; None without a second pass, or where the campaign wants none.
 
     Examples
     --------
@@ -103,6 +106,7 @@ class Analysis:
     agreements: Mapping[str, ConditionAgreement] = field(default_factory=dict)
     sensors: CampaignSensors = field(default_factory=CampaignSensors)
     clocks: Mapping[str, RunClocks] = field(default_factory=dict)
+    listening: Listening | None = None
 
     def result(self, run: str, channel: str) -> ChannelResult:
         """Return spectrum, levels and lines of a channel of a run.

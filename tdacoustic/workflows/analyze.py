@@ -66,9 +66,11 @@ def analyze(
         The campaign or its fleet is wrong, it names a URL that may not be fetched, or (unless `without_runs`) no run
         can be used.
     """
+    from tdacoustic.reporting.template import load_template
     from tdacoustic.steps import execute, lineage, result_of
     from tdacoustic.workflows.fetched_logs import with_fetched_logs
     from tdacoustic.workflows.groundwork import lay_groundwork
+    from tdacoustic.workflows.listening import with_sound
     from tdacoustic.workflows.order_tracking import order_problems
     from tdacoustic.workflows.run_speeds import check_speeds, speed_problems
     from tdacoustic.workflows.runs import gather_run, log_inputs, prepare_runs, run_problems, written_inputs
@@ -77,6 +79,8 @@ def analyze(
     campaign = campaign if isinstance(campaign, Campaign) else load_campaign(campaign)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     campaign, not_fetched = with_fetched_logs(campaign, store, fetch_urls, progress)
+    if campaign.template is not None:  # what is wrong with it is said before the work, not after
+        load_template(campaign.template.path)
     fleet, problems = _fleet(campaign)
     ground = lay_groundwork(campaign, store, 1 if jobs is None else jobs, progress).with_failed(not_fetched)
     prepared = prepare_runs(campaign, store, without_runs, ground)
@@ -102,7 +106,12 @@ def analyze(
     problems += [*_missing_receivers(campaign, runs), *ground.sensors.problems]
     problems += order_problems(first) if deeper else ()
     inputs = (*written_inputs(campaign, fleet is not None), *log_inputs(prepared))
-    return _assemble(first, second, evidence, ground, ([*problems, *second.problems], inputs, tuple(records.items())))
+    analysis = _assemble(
+        first, second, evidence, ground, ([*problems, *second.problems], inputs, tuple(records.items()))
+    )
+    if not (second.made and campaign.analysis.sound_excerpts):
+        return analysis
+    return with_sound(analysis, first, second, store, n_jobs, progress)
 
 
 def _fleet(campaign: Campaign) -> tuple[Fleet | None, list[str]]:

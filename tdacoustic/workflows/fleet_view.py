@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Final
 from tdacoustic.errors import GatheringError
 from tdacoustic.steps.record import versions
 from tdacoustic.workflows.output import OutputFolder
+from tdacoustic.workflows.write import check_pdf, write_report
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -32,6 +33,7 @@ def fleet_view(
     date_key: str | None = None,
     check_all: bool = False,
     progress: Callable[[str, float, int], None] | None = None,
+    pdf: bool = False,
 ) -> Gathering:
     """Gather the results of campaigns in these folders and below into an output folder.
 
@@ -52,6 +54,8 @@ def fleet_view(
         Whether files that are not gathered (a result's report and arrays) are held against their sha256 too.
     progress : callable, optional
         Called with what is done, how much of it and of how much.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
 
     Returns
     -------
@@ -61,7 +65,7 @@ def fleet_view(
     Raises
     ------
     MissingPackageError
-        pyarrow is not installed.
+        pyarrow is not installed, or for a PDF reportlab.
     MissingFileError
         A folder is not there.
     GatheringError
@@ -73,6 +77,7 @@ def fleet_view(
     from tdacoustic.gathering.texts import shown_text
 
     check_pyarrow()
+    check_pdf(pdf)
     named = named_folders(folders)
     target = Path(out)
     output = OutputFolder(target, common_folder(named), overwrite)
@@ -86,7 +91,7 @@ def fleet_view(
         gathering = _gathered(usable, left_out, output, (train_key, date_key), progress)
         if not gathering.results:
             raise GatheringError(f"{words}: {_nothing(found, gathering.left_out)}")
-        _write(gathering, output, named)
+        _write(gathering, output, named, pdf)
     return gathering
 
 
@@ -155,13 +160,12 @@ def _gathered(
     return Gathering(tuple(results), tuple(left_out), compared(results), dataset.rows, links)
 
 
-def _write(gathering: Gathering, output: OutputFolder, named: Sequence[Path]) -> None:
+def _write(gathering: Gathering, output: OutputFolder, named: Sequence[Path], pdf: bool) -> None:
     from tdacoustic.reporting.fleet_report import fleet_report
-    from tdacoustic.reporting.html import render_html
     from tdacoustic.tables import csv_text
 
     output.write_text(OVERVIEW, csv_text(_overview(gathering)))
-    output.write_text("report.html", render_html(fleet_report(gathering)))
+    write_report(output, fleet_report(gathering), pdf)
     left_out = [{"folder": each.folder, "reason": each.reason} for each in gathering.left_out]
     output.manifest = {
         "command": "fleet",

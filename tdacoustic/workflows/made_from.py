@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 from tdacoustic.campaign import Campaign, load_campaign
 from tdacoustic.errors import TdacousticError
 from tdacoustic.fleet import load_fleet
+from tdacoustic.reporting.template import files_of_template
 from tdacoustic.steps import Store
 from tdacoustic.workflows.up_to_date import FOLDER, software, state_of
 
@@ -116,6 +117,8 @@ def _paths_of(campaign: Campaign) -> Iterator[Path]:
     yield campaign.path
     tables = (campaign.run_table, campaign.sensor_table)
     yield from (table.path for table in tables if table is not None)
+    if campaign.template is not None:
+        yield from files_of_template(campaign.template.path)
     for stated in (campaign.fleet, campaign.calibration.prior_fleet):
         if stated is not None:
             yield from _paths_of_fleet(stated.path)

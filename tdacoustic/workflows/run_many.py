@@ -17,6 +17,7 @@ from tdacoustic.workflows.run_many_table import TABLE, CampaignRow, check_table,
 from tdacoustic.workflows.run_many_work import CampaignJob, Told
 from tdacoustic.workflows.run_many_workers import n_workers, work_through
 from tdacoustic.workflows.up_to_date import standing
+from tdacoustic.workflows.write import PDF, check_pdf
 
 if TYPE_CHECKING:
     from tdacoustic.steps import Jobs
@@ -106,6 +107,7 @@ def run_many(
     again: bool = False,
     inner: Jobs | None = None,
     fetch_urls: bool = False,
+    pdf: bool = False,
 ) -> ManyRuns:
     """Run campaigns (`tdacoustic.run`), each into a folder of its own below a root.
 
@@ -131,6 +133,8 @@ def run_many(
         What computes the steps of each campaign, instead of its worker.
     fetch_urls : bool
         As of `tdacoustic.run`.
+    pdf : bool
+        Whether each result has ``report.pdf`` too; one without is not up to date.
 
     Returns
     -------
@@ -141,7 +145,10 @@ def run_many(
     ------
     OutputError
         Before anything is computed: results would lie in each other, or something else is in the way of the table.
+    MissingPackageError
+        A PDF is wanted, and reportlab is not installed.
     """
+    check_pdf(pdf)
     root = Path(root)
     store = store if isinstance(store, Store) else Store(store or default_store_path())
     if not campaigns:
@@ -151,12 +158,20 @@ def run_many(
     book = _Book(campaigns, folders, root)
     _sweep((*folders, root / TABLE))
     with book.kept():
-        open_ones = _left(campaigns, folders, store, book, again, progress)
+        open_ones = _left(campaigns, folders, store, book, again, progress, pdf)
         n = n_workers(len(open_ones), jobs) if open_ones else 0
         within = inner if inner is not None else jobs if len(open_ones) == 1 else 1
         work = [
             CampaignJob(
-                i, campaigns[i].given, campaigns[i].file, folders[i], _absolute(store), within, overwrite, fetch_urls
+                i,
+                campaigns[i].given,
+                campaigns[i].file,
+                folders[i],
+                _absolute(store),
+                within,
+                overwrite,
+                fetch_urls,
+                pdf,
             )
             for i in open_ones
         ]
@@ -184,13 +199,14 @@ def _left(
     book: _Book,
     again: bool,
     progress: Progress | None,
+    pdf: bool,
 ) -> list[int]:
     """Settle what is up to date; return the places of the others."""
     left = []
     for index, (campaign, folder) in enumerate(zip(campaigns, folders, strict=True)):
         if progress is not None:
             progress("looking what is up to date", book.n_settled, len(campaigns))
-        held = None if again else standing(folder, campaign.file, store)
+        held = None if again else standing(folder, campaign.file, store, (PDF,) if pdf else ())
         if held is None:
             left.append(index)
         else:

@@ -36,7 +36,7 @@ class CampaignJob:
     store : Path
     jobs : int or Executor or None
         As of `tdacoustic.run`.
-    overwrite, fetch_urls : bool
+    overwrite, fetch_urls, pdf : bool
     """
 
     index: int
@@ -47,6 +47,7 @@ class CampaignJob:
     jobs: Jobs | None = 1
     overwrite: bool = False
     fetch_urls: bool = False
+    pdf: bool = False
 
 
 @dataclass(frozen=True)
@@ -121,7 +122,7 @@ def _done(job: CampaignJob) -> Told:
     campaign = load_campaign(job.file)
     folder = OutputFolder(job.out, job.file, job.overwrite)
     with threadpool_limits(limits=1):
-        written = run_into(campaign, folder, job.store, job.jobs, fetch_urls=job.fetch_urls)
+        written = run_into(campaign, folder, job.store, job.jobs, fetch_urls=job.fetch_urls, pdf=job.pdf)
     result = written.result
     return Told(
         status="done",

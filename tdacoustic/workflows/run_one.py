@@ -11,7 +11,7 @@ from tdacoustic.steps import Record, Store, default_store_path
 from tdacoustic.workflows.made_from import FilesRead
 from tdacoustic.workflows.output import OutputFolder
 from tdacoustic.workflows.run import run
-from tdacoustic.workflows.write import write_run
+from tdacoustic.workflows.write import check_pdf, write_run
 
 if TYPE_CHECKING:
     from tdacoustic.results import CampaignResult
@@ -47,6 +47,7 @@ def run_into(
     progress: Progress | None = None,
     *,
     fetch_urls: bool = False,
+    pdf: bool = False,
 ) -> WrittenRun:
     """Do all that can be done for a campaign (`tdacoustic.run`) and write it.
 
@@ -57,17 +58,20 @@ def run_into(
         Not entered yet.
     store, jobs, progress, fetch_urls
         As of `tdacoustic.run`.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
 
     Raises
     ------
     TdacousticError
         As `tdacoustic.run`, or the folder cannot be written.
     """
+    check_pdf(pdf)
     place = store.folder if isinstance(store, Store) else store or default_store_path()
     tally = _Tally(place)
     read = FilesRead(campaign, tally)
     result = run(campaign, tally, jobs, progress, fetch_urls=fetch_urls)
-    write_run(result, folder, read)
+    write_run(result, folder, read, pdf)
     steps = {key for key, _ in result.records}
     computed = tally.saved | {key for key in tally.absent if key in tally}
     return WrittenRun(result, len(computed), len(steps - computed))

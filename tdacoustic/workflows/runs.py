@@ -15,8 +15,10 @@ from tdacoustic.measured import FrameSettings, MeasurementSettings, measurement_
 from tdacoustic.measured.runs import MeasuredRun, receivers_of
 from tdacoustic.quality import Verdict
 from tdacoustic.recording import Channel, Log, Recording
+from tdacoustic.reporting.template import TEMPLATE
 from tdacoustic.results import LogInput
 from tdacoustic.steps import LogFile, Store, Task, log_file, result_of
+from tdacoustic.toml_models import file_or_inside
 from tdacoustic.workflows.fetched_logs import hashed_logs
 from tdacoustic.workflows.groundwork import Groundwork, lay_groundwork
 from tdacoustic.workflows.line_speed import fleet_of, line_speed_settings
@@ -241,6 +243,8 @@ def written_inputs(campaign: Campaign, with_fleet: bool) -> tuple[LogInput, ...]
         files.append((campaign.run_table.text, campaign.run_table.path, "runs"))
     if campaign.sensor_table is not None:
         files.append((campaign.sensor_table.text, campaign.sensor_table.path, "sensors"))
+    if campaign.template is not None:
+        files.append((campaign.template.text, file_or_inside(campaign.template.path, TEMPLATE), "template"))
     found = [_input(*file) for file in files]
     if campaign.fleet is not None and with_fleet:
         found.append(fleet_input(campaign.fleet, "fleet"))

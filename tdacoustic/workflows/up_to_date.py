@@ -7,7 +7,7 @@ file that it wrote, is as it was.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -85,7 +85,7 @@ def state_of(path: Path, store: Store) -> str | None:
         return None
 
 
-def standing(folder: Path, campaign: Path, store: Store) -> Standing | None:
+def standing(folder: Path, campaign: Path, store: Store, wanted: Collection[str] = ()) -> Standing | None:
     """Return what a result folder's manifest says where the result is up to date, else None.
 
     Parameters
@@ -96,11 +96,15 @@ def standing(folder: Path, campaign: Path, store: Store) -> Standing | None:
         The campaign file.
     store : Store
         Remembers the hashes of logs by size and time stamps.
+    wanted : collection of str
+        Files that a run may leave out, and that the result must have all the same.
     """
     held = read_manifest(folder) or {}
     made_from, counts, named = (_table(held, key) for key in ("made_from", "counts", "campaign"))
     of_this = held.get("command") == "run" and held.get("subject") == subject_of(campaign, folder)
     if not held.get("complete") or not of_this or made_from.get("software") != software():
+        return None
+    if not set(wanted) <= set(held["files"]):
         return None
     n_runs, n_conditions = counts.get("runs"), counts.get("conditions")
     if not isinstance(n_runs, int) or not isinstance(n_conditions, int):

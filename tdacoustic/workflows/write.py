@@ -19,12 +19,30 @@ if TYPE_CHECKING:
     from tdacoustic.tables.prediction_file import ModelArrays
     from tdacoustic.workflows.made_from import FilesRead
 
-__all__ = ["write_analysis", "write_calibration", "write_check", "write_prediction", "write_run"]
+__all__ = [
+    "PDF",
+    "check_pdf",
+    "write_analysis",
+    "write_calibration",
+    "write_check",
+    "write_prediction",
+    "write_report",
+    "write_run",
+]
 
 ARRAYS = "result.h5"
+PDF = "report.pdf"
 
 
-def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> None:
+def check_pdf(wanted: bool) -> None:
+    """Raise `MissingPackageError`, before anything is computed, where a PDF is wanted and its library is missing."""
+    if wanted:
+        from tdacoustic.reporting.pdf import check_reportlab
+
+        check_reportlab()
+
+
+def write_analysis(analysis: Analysis, folder: OutputFolder, command: str, pdf: bool = False) -> None:
     """Write tables, ``result.h5`` and ``report.html`` of an analysis into an output folder.
 
     Parameters
@@ -34,13 +52,15 @@ def write_analysis(analysis: Analysis, folder: OutputFolder, command: str) -> No
         Not entered yet.
     command : str
         For the manifest.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
     """
     from tdacoustic.reporting.measured_report import measured_report
 
     with folder:
         _write_tables(folder, analysis.tables)
         _write_arrays(folder, analysis.campaign, analysis)
-        _write_report(folder, measured_report(analysis))
+        write_report(folder, in_template(analysis.campaign, measured_report(analysis)), pdf)
         folder.manifest = _manifest(analysis, command)
 
 
@@ -51,7 +71,7 @@ def write_check(analysis: Analysis, out: Path, subject: Path, overwrite: bool) -
         folder.manifest = _manifest(analysis, "check")
 
 
-def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
+def write_prediction(result: FleetPrediction, folder: OutputFolder, pdf: bool = False) -> None:
     """Write tables, ``result.h5`` and ``report.html`` of a prediction into an output folder.
 
     Parameters
@@ -59,6 +79,8 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
     result : FleetPrediction
     folder : OutputFolder
         Not entered yet.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
     """
     from tdacoustic.reporting.predicted_report import predicted_report
     from tdacoustic.tables.prediction_file import write_prediction_file
@@ -66,7 +88,7 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
     with folder:
         _write_tables(folder, result.tables)
         write_prediction_file(folder.staging / ARRAYS, _model_arrays(result))
-        _write_report(folder, predicted_report(result))
+        write_report(folder, predicted_report(result), pdf)
         folder.manifest = {
             "command": "predict",
             "fleet": {"name": result.fleet.name},
@@ -77,7 +99,7 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder) -> None:
         }
 
 
-def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None:
+def write_calibration(result: CampaignCalibration, folder: OutputFolder, pdf: bool = False) -> None:
     """Write ``calibration.json``, ``fleet.calibrated.toml``, ``result.h5`` and ``report.html`` into an output folder.
 
     Parameters
@@ -85,6 +107,8 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
     result : CampaignCalibration
     folder : OutputFolder
         Not entered yet.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
     """
     from tdacoustic.reporting.calibration_report import calibration_report
 
@@ -92,7 +116,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
         _write_fit(folder, result)
         _write_tables(folder, _asked(result))
         _write_arrays(folder, result.campaign, result.analysis)
-        _write_report(folder, calibration_report(result))
+        write_report(folder, in_template(result.campaign, calibration_report(result)), pdf)
         folder.manifest = {
             "command": "calibrate",
             "campaign": named(result.campaign, result.analysis),
@@ -103,7 +127,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder) -> None
         }
 
 
-def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | None = None) -> None:
+def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | None = None, pdf: bool = False) -> None:
     """Write the files of analysis, calibration and prediction into one output folder, with one report.
 
     Parameters
@@ -113,6 +137,8 @@ def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | No
         Not entered yet.
     read : FilesRead, optional
         Which files the run read; the manifest then tells a later run whether the result still holds.
+    pdf : bool
+        Whether ``report.pdf`` is written too.
     """
     from tdacoustic.reporting.run_report import run_report
     from tdacoustic.workflows.made_from import counts_of
@@ -126,7 +152,7 @@ def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | No
         if prediction is not None:
             _write_tables(folder, prediction.tables)
         _write_arrays(folder, result.campaign, analysis, prediction)
-        _write_report(folder, run_report(result))
+        write_report(folder, in_template(result.campaign, run_report(result)), pdf)
         folder.manifest = {
             **_manifest(analysis, "run"),
             **({} if analysis.fleet is None else {"fleet": {"name": analysis.fleet.name}}),
@@ -182,10 +208,24 @@ def _model_arrays(result: FleetPrediction) -> ModelArrays:
     return ModelArrays(fleet.name, result.prediction, fleet.radiation.max_frequency_hz.value)
 
 
-def _write_report(folder: OutputFolder, document: Document) -> None:
+def in_template(campaign: Campaign, document: Document) -> Document:
+    """Return a report as the campaign's template wants it."""
+    if campaign.template is None:
+        return document
+    from tdacoustic.reporting.template import load_template
+
+    return load_template(campaign.template.path).applied(document)
+
+
+def write_report(folder: OutputFolder, document: Document, pdf: bool) -> None:
+    """Write a report into an output folder that is entered: the page, and where it is wanted the PDF."""
     from tdacoustic.reporting.html import render_html
 
     folder.write_text("report.html", render_html(document))
+    if pdf:
+        from tdacoustic.reporting.pdf import render_pdf
+
+        (folder.staging / PDF).write_bytes(render_pdf(document))
 
 
 def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:

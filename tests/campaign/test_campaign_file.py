@@ -157,6 +157,7 @@ def test_the_whole_contract_is_read(load, tmp_path):
         "analysis.motor_speed_range_rpm": None,
         "analysis.motor_speed_change_rpm_s": None,
         "analysis.calibrators": "check",
+        "analysis.sound_excerpts": True,
     }
     assert campaign.settings["calibration.free"] == ("masuda.constant_db",)
     assert campaign.settings["calibration.model_sigma_db"] == 4.0

@@ -245,7 +245,14 @@ def test_a_cavity_with_one_flexible_wall_is_what_finite_elements_of_the_air_give
         expected = np.linalg.solve(np.diag(walls.impedance(frequency)) - pressures[:, 1:], pressures[:, 0])
         found = coupled_velocities(cavity, walls, frequency, 0.01)
         worst = max(worst, np.abs(found - expected).max() / np.abs(expected).max())
-    conformance("modal velocities of a plate before a cavity, worst", 0.0, worst, 2e-3, "", "NGSolve: air by elements")
+    conformance(
+        "modal velocities of a plate before a cavity, worst",
+        0.0,
+        worst,
+        2e-3,
+        "",
+        "program: NGSolve, air by finite elements",
+    )
 
 
 def test_the_air_moves_the_plates_resonances(soft_plate):

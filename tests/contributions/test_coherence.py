@@ -58,12 +58,33 @@ def test_bias_and_interval_are_those_of_drawn_signals(true, n, q, conformance):
     estimates = drawn(true, n, q, 8000)
     error = float(estimates.std() / np.sqrt(estimates.size))
     what = f"coherence {true:g}, {n} averages, {q} inputs"
-    conformance(f"{what}: mean", estimates.mean(), mean_coherence(true, n, q).item(), 4 * error, "", "drawn signals")
+    conformance(
+        f"{what}: mean",
+        estimates.mean(),
+        mean_coherence(true, n, q).item(),
+        4 * error,
+        "",
+        "independent: 8000 drawn cases of Gaussian signals",
+    )
     low, high = coherence_interval(estimates, n, q)
     # 2.5 % on each side; 8000 draws leave 0.17 %. Of no coherence the lower end is 0 and cannot miss on that side.
-    conformance(f"{what}: below the interval", 0.025, float(np.mean(true < low)), 0.007, "", "drawn signals")
+    conformance(
+        f"{what}: below the interval",
+        0.025,
+        float(np.mean(true < low)),
+        0.007,
+        "",
+        "independent: 8000 drawn cases of Gaussian signals",
+    )
     missed = 0.0 if true == 0.0 else 0.025
-    conformance(f"{what}: above the interval", missed, float(np.mean(true > high)), 0.007, "", "drawn signals")
+    conformance(
+        f"{what}: above the interval",
+        missed,
+        float(np.mean(true > high)),
+        0.007,
+        "",
+        "independent: 8000 drawn cases of Gaussian signals",
+    )
 
 
 def test_the_corrected_one_has_no_bias_left():
@@ -75,17 +96,29 @@ def test_the_corrected_one_has_no_bias_left():
 
 
 @pytest.mark.parametrize("averages", [30.0, 40.9, 41.0, 200.0, 3000.0])
-def test_the_mean_law_is_the_hypergeometric_one(averages):
+def test_the_mean_law_is_the_hypergeometric_one(averages, conformance):
     mpmath = pytest.importorskip("mpmath")
+    source = "program: mpmath, mean by the function 2F1 (Carter, Proc. IEEE 75 (1987) 236)"
     for true in (0.0, 0.5, 0.95, 0.9999):
         expected = 1.0 - (averages - 2.0) / averages * (1.0 - true) * float(mpmath.hyp2f1(1, 1, averages + 1, true))
-        assert mean_coherence(true, averages, 2).item() == pytest.approx(expected, rel=1e-12)
+        got, what = (
+            mean_coherence(true, averages, 2).item(),
+            f"mean coherence of {true:g}, {averages:g} averages, 2 inputs",
+        )
+        conformance(what, expected, got, 1e-12 * expected, "1", source)
 
 
 def test_significance_of_none_at_all(conformance):
     """Carter 1987: 1 - level^(1/(n-1)); and signals without coherence exceed it as often."""
     got = significant_coherence(20.0)
-    conformance("5 % level, 20 averages", 1.0 - 0.05 ** (1.0 / 19.0), got, 1e-12, "", "Carter 1987, exact")
+    conformance(
+        "5 % level, 20 averages",
+        1.0 - 0.05 ** (1.0 / 19.0),
+        got,
+        1e-12,
+        "",
+        "literature: G. C. Carter, Proc. IEEE 75 (1987) 236, exact distribution",
+    )
     assert np.mean(drawn(0.0, 20, 1, 8000) > got) == pytest.approx(0.05, abs=0.01)
 
 
@@ -93,7 +126,14 @@ def test_carters_bias_to_first_order(conformance):
     """Bias of about (1 - g)² / n (1 + 2 g / n), G. C. Carter, C. H. Knapp, A. H. Nuttall 1973, for large n."""
     for true in (0.0, 0.3, 0.7):
         got = mean_coherence(true, 100.0).item() - true
-        conformance(f"bias at {true:g}, 100 averages", (1 - true) ** 2 / 100.0, got, 3e-4, "", "Carter 1973")
+        conformance(
+            f"bias at {true:g}, 100 averages",
+            (1 - true) ** 2 / 100.0,
+            got,
+            3e-4,
+            "",
+            "literature: Carter, Knapp, Nuttall, IEEE Trans. Audio Electroacoust. 21 (1973) 337",
+        )
 
 
 def test_two_inputs_with_cross_talk():
@@ -208,5 +248,12 @@ def test_conditioning_uses_up_averages(conformance):
     )
     assert found.averages == n - 2
     # 3000 draws of an exponential-like law: 0.1 / sqrt(3000) = 0.002 standard error
-    conformance("partial coherence of none, 12 averages", 0.1, found.value[0].mean(), 0.008, "", "1/(n - k), drawn")
+    conformance(
+        "partial coherence of none, 12 averages",
+        0.1,
+        found.value[0].mean(),
+        0.008,
+        "",
+        "analytic: 1/(n - k), of drawn Gaussian signals",
+    )
     assert np.mean(found.low[0] > 0.0) == pytest.approx(0.025, abs=0.012)

@@ -46,7 +46,7 @@ def test_they_are_scipys(data, conformance):
         ours = found.s_xx[:, i, j] if j < 2 else found.s_xy[:, i, 0]
         worst = max(worst, float(np.max(np.abs(ours - theirs)) / np.max(np.abs(theirs))))
     # complex64 keeps seven digits
-    conformance("cross spectral densities, worst line", 0.0, worst, 1e-6, "of the largest", "scipy.signal.csd")
+    conformance("cross spectral densities, worst line", 0.0, worst, 1e-6, "of the largest", "program: scipy.signal.csd")
     _, theirs = signal.welch(data[2], RATE, "hann", length, detrend="constant")
     np.testing.assert_allclose(found.s_yy[:, 0], theirs, rtol=1e-6)
 

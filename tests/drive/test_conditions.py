@@ -27,7 +27,7 @@ def test_the_conditions_of_table_4(reference, conformance):
         # rounded as printed; condition 6 is printed as 1001 and defined by 1001.3 Hz
         tolerance = 0.5 if row["condition"] == "6" else 0.0051
         expected, got = float(row["mesh_frequency_hz"]), 31.0 * condition.motor_hz
-        conformance(f"mesh frequency, condition {row['condition']}", expected, got, tolerance, "Hz", "paper, Table 4")
+        conformance(f"mesh frequency, condition {row['condition']}", expected, got, tolerance, "Hz", "paper: Table 4")
 
 
 def test_the_rated_power_at_the_rated_speed(reference):

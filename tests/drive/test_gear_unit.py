@@ -11,7 +11,14 @@ from tdacoustic.errors import FleetError
 def test_the_reference_drive(reference, conformance):
     unit = gear_unit_of(reference)
     helix_deg = math.degrees(unit.geometry.helix_angle_rad)
-    conformance("helix angle from the centre distance", 4.0, helix_deg, 0.0005, "deg", "physics.md section 1")
+    conformance(
+        "helix angle from the centre distance",
+        4.0,
+        helix_deg,
+        0.0005,
+        "deg",
+        "paper: Table 3 (a = 495 mm) with 4 deg of section 5.2",
+    )
     assert unit.system.half_backlash_m == pytest.approx(100e-6)
     assert unit.system.transmission_error_m == pytest.approx((5e-6,))
     # c = 2 ζ √(k m) of the pinion's x bearing, by hand

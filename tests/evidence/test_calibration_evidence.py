@@ -68,7 +68,7 @@ def test_geometry_of_the_truth_is_that_of_the_program(study, conformance):
 
     ours = td.DriveModel(td.load_fleet(REFERENCE_DRIVE)).unit.geometry
     true = geometry(TrueDrive().numbers["gear_pair"][0])
-    source = "geometry of physics.md section 1, written anew"
+    source = "independent: involute geometry of ISO 21771 written anew, tests/evidence/drive_levels.py"
     for what, expected, got in (
         ("helix angle", true.helix_rad, ours.helix_angle_rad),
         ("working pressure angle", true.working_angle_rad, ours.working_pressure_angle_rad),
@@ -123,7 +123,7 @@ def test_the_model_is_the_truth_where_both_have_the_same_parameters(study, name,
         study.GAIN: drive.motor_gain_db,
     }
     true = levels_at_4_m_db(drive)
-    source = "eight printed equations marched in time, Masuda and distance law written anew"
+    source = "independent: equations (1) to (8) of Appl. Sci. 2025, 15, 10597 marched in time, written anew"
     for condition, expected, got in zip(conditions, true, model.levels_db(values), strict=True):
         what = f"level at 4 m, condition {condition.name}, {name}"
         conformance(what, expected, got, 0.002, "dB", source)

@@ -26,11 +26,25 @@ def test_a_limp_wall_follows_the_mass_law(record, conformance):
     """One of this size, in each band; and without end at field incidence, where small walls lie above it."""
     found, finite = np.array(record["limp_db"]), np.array(record["limp_finite_db"])
     worst = float(np.abs(found - finite).max())
-    conformance("limp wall, 250 to 1000 Hz, worst band", 0.0, worst, 1.0, "dB", "mass law of a wall of this size")
+    conformance(
+        "limp wall, 250 to 1000 Hz, worst band",
+        0.0,
+        worst,
+        1.0,
+        "dB",
+        "analytic: mass law of a limp wall of this size, plane waves",
+    )
     octaves = np.log2(np.array(record["bands_hz"][: len(found)]))
     slope = float(np.polyfit(octaves, found, 1)[0])
     own = float(np.polyfit(octaves, finite, 1)[0])
-    conformance("limp wall, slope", own, slope, 0.5, "dB an octave", "mass law of a wall of this size")
+    conformance(
+        "limp wall, slope",
+        own,
+        slope,
+        0.5,
+        "dB an octave",
+        "analytic: mass law of a limp wall of this size, plane waves",
+    )
     above = found - np.array(record["limp_infinite_db"])
     assert above.min() > 0.0 and above.max() < 3.0
 
@@ -38,10 +52,24 @@ def test_a_limp_wall_follows_the_mass_law(record, conformance):
 def test_steel_has_its_dip_at_coincidence(record, conformance):
     """12 mm: c²/(2π) √(m/D) = 997 Hz; above it the infinite plate's law, rising by some 9 dB an octave."""
     bands, found = np.array(record["bands_hz"]), np.array(record["steel_db"])
-    conformance("12 mm of steel, dip", 1000.0, float(bands[found.argmin()]), 1.0, "Hz", "third octave of 997 Hz")
+    conformance(
+        "12 mm of steel, dip",
+        1000.0,
+        float(bands[found.argmin()]),
+        1.0,
+        "Hz",
+        "analytic: coincidence at c²/(2 pi) sqrt(m/D) = 997 Hz, its third octave",
+    )
     assert record["coincidence_hz"] == pytest.approx(996.9, abs=0.1)
     above = bands > 1500.0
     worst = float(np.abs(found - np.array(record["steel_infinite_db"]))[above].max())
-    conformance("12 mm of steel, 1600 and 2000 Hz, worst", 0.0, worst, 1.0, "dB", "infinite plate at field incidence")
+    conformance(
+        "12 mm of steel, 1600 and 2000 Hz, worst",
+        0.0,
+        worst,
+        1.0,
+        "dB",
+        "analytic: thin infinite plate at field incidence",
+    )
     limp = np.array(record["limp_db"])
     assert found[bands == 1000.0][0] < limp[-1] - 15.0

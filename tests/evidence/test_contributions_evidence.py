@@ -27,11 +27,25 @@ def test_the_flag_is_raised_before_the_error_exceeds_three_decibels(record, conf
     """Of contributions stated as known, 0.1 to 0.99 of coherence, one in a hundred at most; plain paths beside them."""
     table = record[seeds]
     wrong = sum(row["ok_over_3_db"] for row in table) / sum(row["ok"] * row["n"] for row in table)
-    conformance(f"stated as known, off by more than 3 dB, {seeds}", 0.0, wrong, 0.01, "of them", "simulated drive")
+    conformance(
+        f"stated as known, off by more than 3 dB, {seeds}",
+        0.0,
+        wrong,
+        0.01,
+        "of them",
+        "known input: simulated drives, tests/evidence/contributions_study.py",
+    )
     for row in table:
         if row["ok"] > 0.05:
             what = f"{row['kind']}, coherence {row['asked']:g}, 95 % of the errors, {seeds}"
-            conformance(what, 0.0, row["ok_95_db"], 1.5, "dB", "simulated drive")
+            conformance(
+                what,
+                0.0,
+                row["ok_95_db"],
+                1.5,
+                "dB",
+                "known input: simulated drives, tests/evidence/contributions_study.py",
+            )
         if row["coherence"] > 0.85:
             assert row["plain_95_db"] > 10.0
         if row["coherence"] > 0.98:

@@ -35,9 +35,9 @@ def test_the_record_is_of_several_campaigns_and_kills(found):
 
 
 @pytest.mark.parametrize("workers", ["1", "2"])
-def test_nothing_is_done_twice(found, workers, conformance):
+def test_nothing_is_done_twice(found, workers):
     part = found["workers"][workers]
-    conformance("a second call over the first", 0.0, part["second_of_first"], 0.02, "1", f"{workers} workers")
+    assert part["second_of_first"] <= 0.02
     assert part["unchanged"] == found["campaigns"] and part["same_files_after"]
     assert found["workers"]["2"]["again_computed"] == 0
 

@@ -25,15 +25,14 @@ def test_the_record_is_of_these_sources(study, record):
     assert record["sources_sha256"] == study.sources(), f"the record is stale: {RERUN}"
 
 
-def test_levels_over_elements_a_wavelength(study, record, conformance):
+def test_levels_over_elements_a_wavelength(study, record):
     """Physics.md, section 8: 7.5 elements a wavelength stay within 0.35 dB, 11 within 0.1 dB."""
     rows = {row["elements_per_wavelength"]: row for row in record["elements"]}
     finest = rows[study.ELEMENTS[-1]]
     for elements, band in ((7.5, 0.35), (11.0, 0.1)):
         for path in study.PATHS:
             apart = study.largest(rows[elements][path], finest[path])
-            what = f"{path} at 4 m, {elements:g} elements a wavelength, worst condition"
-            conformance(what, 0.0, apart, band, "dB", "our boundary elements with 15 elements a wavelength")
+            assert abs(apart) <= band, f"{path} at 4 m, {elements:g} elements a wavelength, worst condition"
 
 
 def test_levels_over_the_number_of_modes(study, record):
@@ -47,8 +46,7 @@ def test_levels_over_the_number_of_modes(study, record):
     assert apart[1.2] <= apart[0.8]
 
 
-def test_vectors_are_what_direct_solutions_give(record, conformance):
+def test_vectors_are_what_direct_solutions_give(record):
     assert len(record["direct"]) > 10
     apart = np.array([row["db"] - row["direct"] for row in record["direct"]])
-    what = f"{len(apart)} lines of the structure at 4 m, worst"
-    conformance(what, 0.0, float(np.abs(apart).max()), 0.2, "dB", "a direct solution of each line")
+    assert float(np.abs(apart).max()) <= 0.2

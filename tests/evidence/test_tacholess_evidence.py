@@ -26,7 +26,7 @@ def test_speeds_that_are_found_are_right(record, start, conformance):
     """200 run-ups nobody looked at when the thresholds were set."""
     got = record[start]
     assert got["runs"] == 200
-    source = "synthetic run-ups"
+    source = "known input: 200 run-ups of known speed, tests/evidence/tacholess_study.py"
     wrong = got["wrong_harmonic"] / got["found"]
     conformance(f"wrong harmonics, start {start}", 0.0, wrong, 0.02, "1", source)
     conformance(f"rms speed error, all runs, start {start}", 0.0, got["rms_all"], 0.003, "1", source)

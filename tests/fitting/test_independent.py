@@ -144,7 +144,7 @@ def test_scipy_alone_finds_the_same(problem, ours, conformance):
     close = {"xtol": 1e-12, "ftol": 1e-12, "gtol": 1e-12}
     best = least_squares(problem.plain, start, "3-point", bounds, x_scale=[1.0, 0.1], **close)
     errors = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)))
-    source = "scipy.optimize alone on a plain function"
+    source = "program: scipy.optimize alone, on a plain function of the test"
     conformance("chi square of two parameters", 2.0 * best.cost, ours["chi square"], 0.001, "1", source)
 
     def profile(index, value):
@@ -189,7 +189,7 @@ def test_a_grid_finds_the_same(problem, ours, conformance):
             for place in dampings
         ]
     )
-    source = "chi square on a grid of two parameters"
+    source = "independent: chi square on a grid of two parameters"
     profiles = {CONSTANT: (constants, least(surface)), DAMPING: (dampings, least(surface.T))}
     for key, (places, profile) in profiles.items():
         value, _, ci68, ci95 = ours[key]

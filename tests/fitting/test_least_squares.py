@@ -34,9 +34,13 @@ def test_the_same_as_scipy_alone(measured, conformance):
     )
     errors = found.standard_errors()
     for index, name in enumerate(("size", "rate")):
-        conformance(f"{name} of a decay", values[index], found.values[name], 1e-6, "1", "scipy curve_fit")
+        conformance(
+            f"{name} of a decay", values[index], found.values[name], 1e-6, "1", "program: scipy.optimize.curve_fit"
+        )
         error = float(np.sqrt(covariance[index, index]))
-        conformance(f"standard error of {name}", error, errors[name], 1e-3 * error, "1", "scipy curve_fit")
+        conformance(
+            f"standard error of {name}", error, errors[name], 1e-3 * error, "1", "program: scipy.optimize.curve_fit"
+        )
     assert found.minima == ()
     assert found.rank == 2
 
@@ -52,9 +56,16 @@ def test_the_same_minimum_and_interval_as_on_a_grid(measured, conformance):
     for name, grid, axis in (("size", size[:, 0], 1), ("rate", rate[0], 0)):
         profile = chi.min(axis=axis)
         inside = grid[profile <= chi.min() + 3.841459]
-        for end, expected in zip(interval[name], (inside[0], inside[-1]), strict=True):
+        for side, end, expected in zip(("lower", "upper"), interval[name], (inside[0], inside[-1]), strict=True):
             tolerance = 2.0 * float(grid[1] - grid[0])
-            conformance(f"end of the 95 % interval of {name}", expected, end, tolerance, "1", "grid of two parameters")
+            conformance(
+                f"{side} end of the 95 % interval of {name}",
+                expected,
+                end,
+                tolerance,
+                "1",
+                "independent: chi square on a grid of two parameters",
+            )
 
 
 def test_a_logarithmic_scale_changes_no_optimum(measured):
@@ -68,8 +79,17 @@ def test_a_prior_is_one_more_datum(conformance):
     # Straight line through the origin with one datum a·2 = 4 ± 0.5 and a prior a = 1 ± 0.5: exact by hand.
     # weights 2²/0.25 = 16 and 4: a = (16·2 + 4·1)/20 = 1.8, sigma 1/√20
     found = fit(lambda v: np.array([(2.0 * v["a"] - 4.0) / 0.5]), [FreeParameter("a", 0.0, prior=(1.0, 0.5))])
-    conformance("a with a prior", 1.8, found.values["a"], 1e-9, "1", "by hand")
-    conformance("its standard error", 20.0**-0.5, found.standard_errors()["a"], 1e-9, "1", "by hand")
+    conformance(
+        "a with a prior", 1.8, found.values["a"], 1e-9, "1", "analytic: one datum and a Gaussian prior, by hand"
+    )
+    conformance(
+        "its standard error",
+        20.0**-0.5,
+        found.standard_errors()["a"],
+        1e-9,
+        "1",
+        "analytic: one datum and a Gaussian prior, by hand",
+    )
 
 
 def test_sigma_that_is_not_known_is_taken_from_the_misfit(measured):

@@ -117,10 +117,24 @@ def test_the_posterior_of_a_straight_line_is_the_exact_one(conformance):
     (held,) = posterior.parameters
     assert posterior.has_converged
     error = 0.5 / np.sqrt(held.effective_samples)
-    conformance("median of a Gaussian posterior", 2.0, held.median, 5.0 * error, "1", "by hand")
+    conformance(
+        "median of a Gaussian posterior",
+        2.0,
+        held.median,
+        5.0 * error,
+        "1",
+        "analytic: Gaussian posterior of one datum",
+    )
     for index, sign in ((0, -1.0), (1, 1.0)):
         expected = 2.0 + sign * 0.5 * norm.ppf(0.975)
-        conformance("end of its 95 % interval", expected, held.ci95[index], 12.0 * error, "1", "by hand")
+        conformance(
+            f"{'lower' if sign < 0.0 else 'upper'} end of its 95 % interval",
+            expected,
+            held.ci95[index],
+            12.0 * error,
+            "1",
+            "analytic: Gaussian posterior of one datum",
+        )
     again = sample_posterior(residuals, fit(residuals, free), PosteriorSettings(16, 3000))
     assert np.array_equal(again.samples, posterior.samples)
 
@@ -177,11 +191,25 @@ def test_intervals_are_those_of_lmfit(shared_fleet, levels_of, conformance):
         return chi2.cdf(other.chisqr - best.chisqr, 1)
 
     theirs = lmfit.conf_interval(minimizer, result, sigmas=[0.95], prob_func=by_chi_square)
-    for index, end in ((0, 0), (2, 1)):
+    for side, index, end in (("lower", 0, 0), ("upper", 2, 1)):
         expected = theirs["constant"][index][1]
-        conformance("end of the constant's 95 % interval", expected, ours[CONSTANT][end], 0.01, "dB", "lmfit")
+        conformance(
+            f"{side} end of the constant's 95 % interval",
+            expected,
+            ours[CONSTANT][end],
+            0.01,
+            "dB",
+            "program: lmfit.conf_interval",
+        )
         expected = float(np.exp(theirs["damping"][index][1]))
-        conformance("end of the damping's 95 % interval", expected, ours[DAMPING][end], 2e-3 * expected, "1", "lmfit")
+        conformance(
+            f"{side} end of the damping's 95 % interval",
+            expected,
+            ours[DAMPING][end],
+            2e-3 * expected,
+            "1",
+            "program: lmfit.conf_interval",
+        )
 
 
 def test_the_motors_gain_is_a_third_parameter(shared_fleet, levels_of):

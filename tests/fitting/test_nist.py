@@ -110,7 +110,14 @@ def test_certified_values(name, start, conformance):
         assert got < WANTED[problem.level], f"{name} no longer fails: take it from the list"
         pytest.xfail(FAILS[name, start])
     wanted = WANTED[problem.level]
-    conformance(f"{name}, start {start + 1}: certified digits", 11.0, got, 11.0 - wanted, "digits", "NIST StRD")
+    conformance(
+        f"{name}, start {start + 1}: certified digits",
+        11.0,
+        got,
+        11.0 - wanted,
+        "digits",
+        f"certified: NIST Statistical Reference Datasets, nonlinear regression, {name}",
+    )
     errors = np.array(list(found.standard_errors().values()))
     assert errors == pytest.approx(problem.deviations, rel=1e-3), "standard deviations"
     assert found.chi_square == pytest.approx(problem.sum_of_squares, rel=1e-5, abs=1e-20)

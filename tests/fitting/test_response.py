@@ -13,7 +13,7 @@ from .conftest import CONSTANT, DAMPING, GAIN
 BEARING = "gear_dynamics.bearing_damping_ratio"
 
 
-def test_levels_between_the_nodes_are_the_computed_ones(shared_fleet, levels_of, conformance):
+def test_levels_between_the_nodes_are_the_computed_ones(shared_fleet, levels_of):
     model = LevelModel(shared_fleet, levels_of({}))
     assert model.prepare([free_parameter(shared_fleet, key) for key in (CONSTANT, DAMPING)]) <= TOLERANCE_DB
     random = np.random.default_rng(3)
@@ -21,7 +21,7 @@ def test_levels_between_the_nodes_are_the_computed_ones(shared_fleet, levels_of,
     for place in random.uniform(np.log(0.005), np.log(0.5), 40):
         values = {CONSTANT: 3.0, DAMPING: float(np.exp(place))}
         worst = max(worst, float(np.abs(model.levels_db(values) - model.levels_db(values, exact=True)).max()))
-    conformance("interpolated level over damping", 0.0, worst, 0.01, "dB", "the computed level")
+    assert worst <= 0.01
 
 
 def test_over_two_parameters_too(shared_fleet, levels_of):

@@ -108,7 +108,7 @@ def test_a_level_73_file_that_matlab_wrote():
     np.testing.assert_array_equal(read(log, "testdouble"), np.arange(9) * np.pi / 4)
 
 
-def test_the_bearing_of_a_test_rig(recordings):
+def test_the_bearing_of_a_test_rig(recordings, conformance):
     path = recordings / "mfpt_bearing" / "OuterRaceFault_vload_7.mat"
     log = scan(path)
     assert [channel.name for channel in log.channels] == ["bearing.gs"]
@@ -118,7 +118,8 @@ def test_the_bearing_of_a_test_rig(recordings):
     assert dict(log.metadata)["sampling rate"] == "48828 Hz, from 'bearing.sr'"
     assert dict(log.metadata)["bearing.rate"] == "25" and dict(log.metadata)["bearing.load"] == "300"
     gs = scipy.io.loadmat(path)["bearing"][0, 0]["gs"]
-    np.testing.assert_array_equal(read(log, "bearing.gs"), gs[:, 0])
+    apart = float(np.abs(read(log, "bearing.gs") - gs[:, 0]).max())
+    conformance("OuterRaceFault_vload_7.mat, largest difference", 0.0, apart, 0.0, "g", "program: scipy.io.loadmat")
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -59,13 +59,14 @@ def test_the_real_daqmx_log(recordings):
     assert log.metadata == (("name", "Raw Layer_00001"),)
 
 
-def test_the_real_log_is_read_as_npTDMS_reads_it_and_as_its_bytes_say(recordings):
+def test_the_real_log_is_read_as_npTDMS_reads_it_and_as_its_bytes_say(recordings, conformance):
     path = recordings / "nptdms_daqmx" / "raw1.tdms"
     log = scan(path)
     values = np.concatenate(list(log.reader.blocks(range(7), 0, 2000, 333)), axis=1)
     for row, (name, wanted) in enumerate(by_nptdms(path).items()):
         assert log.channels[row].name == name
-        assert np.array_equal(values[row], wanted)
+        apart = float(np.abs(values[row] - wanted).max())
+        conformance(f"DAQmx log raw1.tdms, {name}: largest difference", 0.0, apart, 0.0, "V", "program: npTDMS")
     counts = np.frombuffer(path.read_bytes()[4737 : 4737 + 28000], "<i2").reshape(
         2000, 7
     )  # the one segment with values
@@ -227,22 +228,26 @@ SENSORS = [
 
 @pytest.mark.filterwarnings("ignore:'where' used without 'out'")  # npTDMS, of the RTD
 @pytest.mark.parametrize("properties", SENSORS, ids=lambda p: p["NI_Scale[0]_Scale_Type"])
-def test_scalings_are_those_of_npTDMS(tmp_path, properties):
+def test_scalings_are_those_of_npTDMS(tmp_path, properties, request, conformance):
     volts = np.linspace(0.021, 0.3, 40)
     path = written(tmp_path, segment([("/'g'/'a'", plain("f8", 40), {**wave("V"), **properties})], f8(volts)))
     wanted = by_nptdms(path)["a"]
     assert np.isfinite(wanted).all() and np.ptp(wanted) > 0
     # the RTD's quartic is solved to 1e-12 K of 200 K by both
-    np.testing.assert_allclose(read(scan(path)), wanted, rtol=1e-12, atol=1e-11)
+    apart = float(np.max(np.abs(read(scan(path)) - wanted) / (1e-11 + 1e-12 * np.abs(wanted))))
+    what = f"scaling {request.node.callspec.id}, largest difference over 1e-11 + 1e-12 of the value"
+    conformance(what, 0.0, apart, 1.0, "1", "program: npTDMS")
 
 
-def test_a_platinum_thermometer_by_the_standard():
+def test_a_platinum_thermometer_by_the_standard(conformance):
     """IEC 60751, Pt100: -100 degrees C are 60.26 ohm, 0 are 100, 100 are 138.51 (rounded to 0.01 ohm there)."""
     scaling = read_scaling(
         [scales("RTD", Lead_Wire_Resistance=0.0, Resistance_Configuration=4, **RTD)], frozenset([RAW])
     )
     celsius = scaling.apply({RAW: np.array([60.26, 100.0, 138.51, np.nan, -1e9]) * 1e-3})
-    np.testing.assert_allclose(celsius[:3], [-100.0, 0.0, 100.0], atol=0.015)  # 0.005 ohm are 0.013 K
+    for ohm, printed, got in zip((60.26, 100.0, 138.51), (-100.0, 0.0, 100.0), celsius[:3], strict=True):
+        # 0.005 ohm are 0.013 K
+        conformance(f"Pt100 of {ohm:g} ohm", printed, got, 0.015, "°C", "standard: IEC 60751, table of the Pt100")
     assert np.isnan(celsius[3:]).all()
 
 

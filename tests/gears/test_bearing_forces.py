@@ -13,6 +13,8 @@ from reference_drive import RATED_TORQUE_N_M, reference_system
 from tdacoustic.errors import GearError
 from tdacoustic.gears import ContactLines, bearing_forces, sampling_points, steady_state
 
+PRINTED = "equations (1) to (6) of Appl. Sci. 2025, 15, 10597"
+
 TWO_PI = 2.0 * np.pi
 PLACES = [[0, 1, 2], [4, 5, 6]]
 
@@ -40,7 +42,7 @@ def test_mean_forces_balance_the_torque(torque, conformance):
     psi, helix = system.pressure_angle_rad, system.base_helix_angle_rad
     expected = [transverse * math.sin(psi), transverse * math.cos(psi), transverse * math.tan(helix)]
     for name, hand, pinion, wheel in zip("xyz", expected, *found.mean_n, strict=True):
-        source = "statics"
+        source = "analytic: statics of the tooth force"
         # The shaft of the pinion presses against the generalised force -V F.
         conformance(f"mean bearing force {name}, {torque} N m", -hand, pinion, 1e-9 * abs(hand), "N", source)
         assert wheel == -pinion
@@ -73,7 +75,7 @@ def test_forces_under_a_sine_of_error_are_those_of_the_eight_equations(conforman
         for gear, place in enumerate(PLACES):
             for name, hand, got in zip("xyz", force[place], found.amplitude_n[gear, :, line], strict=True):
                 what = f"bearing force {name} of gear {gear + 1} at harmonic {line + 1}"
-                source = "direct solution of the eight printed equations"
+                source = f"independent: direct solution of {PRINTED}"
                 conformance(what, abs(hand), abs(got), 1e-8 * abs(hand), "N", source)
                 assert got == pytest.approx(hand, rel=1e-8)
 
@@ -94,7 +96,7 @@ def test_lines_are_the_spectrum_of_the_forces_in_time(mesh_hz, torque, error, co
     for gear, place in enumerate(PLACES):
         difference = np.abs(found.amplitude_n[gear, :, :12] - spectrum[place]).max() / largest
         what = f"largest difference of bearing force lines of gear {gear + 1}, {mesh_hz} Hz, {torque} N m"
-        source = "spectrum of K x + C x' by scipy DOP853 of the eight printed equations"
+        source = f"independent: spectrum of K x + C x' by scipy DOP853 of {PRINTED}"
         conformance(what, 0.0, difference, tolerance, "1", source)
         assert force[place].mean(axis=1) == pytest.approx(found.mean_n[gear], rel=5e-3)
 

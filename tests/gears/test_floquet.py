@@ -69,7 +69,7 @@ def test_multipliers_of_meissners_equation(ratio, damping_ratio, conformance):
     got = (pair[0] + pair[1]).real if abs(pair[0] - pair[1]) > 1e-3 else 2.0 * pair[0].real
     what = f"trace of the monodromy at {ratio} omega_n, zeta = {damping_ratio}"
     # At most 0.3 rad a step, where the series of the exponential leaves 0.3^7/7! = 4e-8; the masses give way by 1e-7.
-    conformance(what, trace, got, 3e-6, "1", "Meissner's equation, closed form")
+    conformance(what, trace, got, 3e-6, "1", "analytic: Meissner's equation")
     # Near a double multiplier its root of that.
     assert np.abs(np.array(pair) - expected).max() < (3e-6 if abs(expected[0] - expected[1]) > 0.1 else 2e-3)
 
@@ -97,7 +97,7 @@ def test_instability_near_twice_the_natural_frequency_has_meissners_limits(dampi
         got = brentq(lambda ratio: largest(system, ratio * unit) - above, exact - 0.02, exact + 0.02, xtol=1e-9)
         what = f"{side} limit of instability over omega_n, zeta = {damping_ratio}"
         # As the multipliers; the trace changes by about 2 over a unit of the ratio.
-        conformance(what, exact, got, 5e-7, "1", "Meissner's equation, closed form")
+        conformance(what, exact, got, 5e-7, "1", "analytic: Meissner's equation")
 
 
 @pytest.mark.parametrize(("lines", "damping_ratio"), [
@@ -115,7 +115,7 @@ def test_weak_variation_has_mathieus_limits(lines, damping_ratio, conformance):
         for sign in (-1.0, 1.0)
     ]
     what = f"half-width of the principal instability over omega_n, h = {h:.4f}, zeta = {damping_ratio}"
-    source = "Mathieu's equation, Landau and Lifshitz, Mechanics, section 27"
+    source = "literature: Mathieu's equation, Landau and Lifshitz, Mechanics, section 27"
     # The second order shifts the middle only; the width has the third, from the stiffness's other harmonics too.
     conformance(what, half_width, 0.5 * (limits[1] - limits[0]), h**3, "1", source)
     assert 0.5 * sum(limits) == pytest.approx(2.0, abs=h**2)
@@ -140,7 +140,7 @@ def test_constant_stiffness_has_the_multipliers_of_its_eigenvalues(mesh_hz, conf
     teeth = BondedTeeth(system, mesh_hz, RATED_TORQUE_N_M)
     values = np.linalg.eigvals(teeth.matrix(system.mesh_stiffness_n_per_m))
     found = in_contact(system, mesh_hz)
-    source = "eigenvalues of the equations with the rigid rotation taken out"
+    source = "independent: numpy eigenvalues of the equations, the rigid rotation taken out"
     what = f"largest distance of the 14 multipliers from exp(lambda T), {mesh_hz} Hz"
     # At most 0.3 rad a step of the fastest, where the series of the exponential leaves 4e-8.
     conformance(what, 0.0, apart(found, np.exp(values / mesh_hz)), 2e-7, "1", source)
@@ -217,7 +217,7 @@ def test_multipliers_of_teeth_that_separate_are_those_of_the_period_map(case, co
         columns.append((ahead - behind) / (2.0 * scale[column]))
     exact = np.linalg.eigvals(np.array(columns).T)
     found = floquet_multipliers(system, mesh_hz, motion.displacement_m)
-    source = "period map of the eight printed equations (DOP853)"
+    source = "independent: period map (DOP853) of equations (1) to (6) of Appl. Sci. 2025, 15, 10597"
     # When teeth meet and part is known between two samples; near a double multiplier that is felt as its root.
     tolerance = 0.02 if reading == "always" else 0.04
     what = f"{mesh_hz} Hz, {torque} N m, damper {reading}"

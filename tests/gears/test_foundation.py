@@ -115,7 +115,7 @@ def test_the_power_into_gears_and_housing_is_what_they_lose(damping, mesh_hz, co
     assert in_bearings > 0.01 * into
     assert in_housing > 0.01 * into
     what = f"power into gears and housing over what they lose, {damping}, {mesh_hz:g} Hz"
-    conformance(what, 1.0, into / (in_bearings + in_housing), 1e-9, "1", "energy")
+    conformance(what, 1.0, into / (in_bearings + in_housing), 1e-9, "1", "law: conservation of energy")
 
 
 def test_the_mean_does_not_change():

@@ -31,7 +31,7 @@ def spur(teeth, addendum=1.0, clearance=0.25, shift=(0.0, 0.0), pressure_angle_d
 
 @pytest.mark.parametrize(("degrees", "printed"), [(14.5, 0.0055448), (20.0, 0.0149044), (25.0, 0.0299753)])
 def test_involute_function_is_that_of_the_tables(degrees, printed, conformance):
-    source = "tables of inv, e.g. Dudley's Gear Handbook"
+    source = "literature: tables of inv, e.g. Dudley's Gear Handbook"
     # Half the last printed digit.
     conformance(f"inv {degrees} deg", printed, involute(math.radians(degrees)), 5e-8, "1", source)
 
@@ -53,7 +53,7 @@ def test_no_angle_has_a_negative_involute():
 
 def test_centre_distance_of_the_paper_gives_its_helix_angle(conformance):
     angle = helix_angle_of(CENTRE_DISTANCE_M, TEETH, NORMAL_MODULE_M, PRESSURE_ANGLE_RAD, PROFILE_SHIFT)
-    source = "paper, Table 3 (a = 495 mm) with 4 deg of section 5.2"
+    source = "paper: Table 3 (a = 495 mm) with 4 deg of section 5.2"
     # 0.001 deg is 0.6 um of centre distance, well inside of what a drawing's 495 mm can mean.
     conformance("helix angle at a = 495 mm", 4.0, math.degrees(angle), 1e-3, "deg", source)
     a = reference_geometry(4.0).centre_distance_m
@@ -78,7 +78,7 @@ def test_pair_of_the_paper_has_the_size_that_physics_md_states():
 
 def test_first_example_of_the_technical_report(conformance):
     # Example 1: z = 17/103, m_n = 8 mm, beta = 15.8 deg, x = 0.145 (0.14522 unrounded), a = 500 mm, 9 kN m, 360 rpm.
-    source = "ISO/TR 6336-30:2017, example 1"
+    source = "standard: ISO/TR 6336-30:2017, example 1"
     pair = GearGeometry((17, 103), 8e-3, math.radians(20), math.radians(15.8), (0.14522, 0.0), 1.0, 0.4, 0.1)
     conformance("centre distance", 500.0, 1e3 * pair.centre_distance_m, 1e-3, "mm", source)
     # Half the last printed digit each.
@@ -99,7 +99,9 @@ def test_spur_pair_without_shifts_meshes_at_half_the_sum_of_teeth_times_module(t
 def test_contact_ratio_of_a_textbook_pair(conformance):
     # z = 20 and 40, module 1, 20 deg: r = 10, 20; r_b = 9.396926, 18.793852; r_a = 11, 21; a sin = 30 x 0.342020
     # sqrt(121 - 88.302222) = 5.718197; sqrt(441 - 353.208889) = 9.369691; minus 10.260604 = 4.827284; p_b = 2.952131
-    conformance("contact ratio, z = 20/40", 1.635186, spur((20, 40)).transverse_contact_ratio, 1e-6, "1", "hand")
+    conformance(
+        "contact ratio, z = 20/40", 1.635186, spur((20, 40)).transverse_contact_ratio, 1e-6, "1", "analytic: by hand"
+    )
 
 
 @pytest.mark.parametrize(("pressure_angle_deg", "printed"), [(20.0, 1.981), (25.0, 1.662)])
@@ -109,7 +111,9 @@ def test_contact_ratio_tends_to_that_of_two_racks(pressure_angle_deg, printed, c
     assert limit == pytest.approx(printed, abs=5e-4)
     got = spur((10**6, 10**6), pressure_angle_deg=pressure_angle_deg).transverse_contact_ratio
     # The next term of the expansion in 1/z is of size 4/z.
-    conformance(f"contact ratio of racks, {pressure_angle_deg} deg", limit, got, 2e-5, "1", "4 / (pi sin 2 alpha)")
+    conformance(
+        f"contact ratio of racks, {pressure_angle_deg} deg", limit, got, 2e-5, "1", "analytic: 4 / (pi sin 2 alpha)"
+    )
 
 
 def test_overlap_ratio_counts_the_axial_pitches_in_the_face_width():
@@ -196,7 +200,7 @@ def test_gears_cut_by_a_rack_mesh_at_the_centre_distance_and_for_the_contact_rat
         return pitch - first.thickness(a * share) - second.thickness(a * (1.0 - share))
 
     a = brentq(play, 0.97 * pair.centre_distance_m, 1.03 * pair.centre_distance_m, xtol=1e-12)
-    source = "teeth cut by a rack in the test"
+    source = "independent: teeth cut by a rack in the test"
     # 100 001 points of a flank, joined by straight lines: a relative 1e-8 and less.
     conformance(f"centre distance without play, {name}", 1e3 * a, 1e3 * pair.centre_distance_m, 1e-5, "mm", source)
     tips = [
@@ -312,7 +316,14 @@ def test_largest_wheel_without_interference_is_that_of_the_textbook(pinion, larg
         while True:
             spur((pinion, wheel + 1))
             wheel += 1
-    conformance(f"largest wheel for {pinion} teeth", largest_wheel, wheel, 0.0, "teeth", "Shigley, eq. (13-12)")
+    conformance(
+        f"largest wheel for {pinion} teeth",
+        largest_wheel,
+        wheel,
+        0.0,
+        "teeth",
+        "literature: Shigley's Mechanical Engineering Design, eq. (13-12)",
+    )
 
 
 def test_overlap_of_helical_teeth_makes_up_for_a_small_transverse_contact_ratio():

@@ -70,7 +70,7 @@ def test_constant_stiffness_answers_each_harmonic_of_the_error_alone(conformance
         assert expected == pytest.approx(closed, rel=1e-10, abs=1e-20)
         if amplitude:
             what = f"amplitude of delta at harmonic {k} under a sine of transmission error"
-            got, source = 2e6 * abs(found.displacement_m[k]), "closed form, constant stiffness"
+            got, source = 2e6 * abs(found.displacement_m[k]), "analytic: constant stiffness"
             conformance(what, 2e6 * abs(closed), got, 1e-9 * 2e6 * abs(closed), "um", source)
     assert np.abs(found.displacement_m[5:]).max() < 1e-20
     assert found.displacement_m[0].real == pytest.approx(
@@ -125,7 +125,7 @@ def test_varying_stiffness_gives_the_exact_periodic_motion(name, lines, mesh_hz,
     error = np.abs(series_at(found.displacement_m, phases) - exact).max() / np.ptp(exact)
     what = f"largest difference of delta over its peak to peak, {name}, {mesh_hz} Hz, {torque} N m"
     # As small as the solution claims its error to be.
-    conformance(what, 0.0, error, TAIL, "1", "periodic solution of the equations from kink to kink (DOP853)")
+    conformance(what, 0.0, error, TAIL, "1", "independent: periodic solution from kink to kink")
 
 
 @pytest.mark.parametrize("mesh_hz", [300.0, 525.0, 700.0])
@@ -161,7 +161,7 @@ def test_error_falls_with_the_number_of_harmonics_as_theory_says(
         # Without the harmonics beyond N that follow from the force: the balance itself.
         waveform.append(np.abs(series_at(found[: number + 1], phases) - exact).max())
         low.append(np.abs(found[1:4] - fine[1:4]).max())
-    source = "theory of Fourier series"
+    source = "analytic: order at which the Fourier series of the stiffness falls"
     for what, errors, order in (("delta", waveform, waveform_order), ("harmonics 1 to 3", low, harmonic_order)):
         observed = -np.polyfit(np.log(numbers), np.log(errors), 1)[0]
         # Their last harmonics lie anywhere in the lobes of the stiffness series, which scatters the fit.
@@ -405,7 +405,7 @@ def test_resonance_peaks_of_separating_teeth_lie_on_the_backbone(damping_ratio, 
     free_hz, in_contact = backbone(highest, static, omega_n)
     what = f"peak over natural frequency, e = {level} q_s, zeta = {damping_ratio}"
     # Two steps of the sweep; damping and error shift it by their squares.
-    conformance(what, free_hz / natural_hz, at / natural_hz, 2e-3, "1", "free vibration with flight, closed form")
+    conformance(what, free_hz / natural_hz, at / natural_hz, 2e-3, "1", "analytic: free vibration with flight")
     # 128 samples a period, and the error's part in when teeth touch.
     assert contact == pytest.approx(in_contact, abs=0.02)
 

@@ -46,7 +46,7 @@ PLAIN = {
 )  # fmt: skip
 def test_level_by_hand(change, by_hand, conformance):
     what = ", ".join(f"{name} {value:.4g}" for name, value in change.items()) or "all 1"
-    source = "paper, equation (8), by hand"
+    source = "paper: equation (8), by hand"
     conformance(f"Masuda's level, {what}", by_hand, masuda_level_db(**PLAIN | change), 1e-6, "dB", source)
 
 
@@ -91,7 +91,7 @@ def condition_5(power_kw, displacement_um=14.8491):
 def test_printed_level_of_condition_5_needs_a_power_of_9(conformance):
     # physics.md section 4, where it was computed by hand: the power that is printed nowhere.
     power = brentq(lambda power: condition_5(power) - 86.517, 0.1, 1000.0)
-    source = "paper, section 4.3 (86.517 dB, 14.8491 um); physics.md section 4"
+    source = "paper: section 4.3 (86.517 dB, 14.8491 um), equation (8) solved for W by hand"
     conformance("power that the printed level of condition 5 needs", 9.08, power, 0.01, "kW", source)
 
 
@@ -99,7 +99,7 @@ def test_printed_levels_of_condition_5_contradict_each_other(conformance):
     once, table = (
         brentq(lambda power, level=level: condition_5(power) - level, 0.1, 1e4) for level in (86.517, 93.6556)
     )
-    source = "paper, section 4.3 against Table 5; physics.md section 4"
+    source = "paper: section 4.3 (86.517 dB) against Table 5 (93.6556 dB), 10^(7.1386/20)"
     conformance("factor in W X between section 4.3 and Table 5", 2.27, table / once, 0.01, "1", source)
 
 

@@ -23,7 +23,7 @@ def test_spur_pair_by_hand(conformance):
     # c' = 0.8 x 0.975 / 0.0575655 = 13.549783; contact ratio 2 (sqrt(21^2 - 18.793852^2) - 20 sin 20) / 2.952131
     # = 2 (9.369691 - 6.840403) / 2.952131 = 1.713534; c_g = 13.549783 (0.75 x 1.713534 + 0.25) = 20.800961
     found = mesh_stiffness(SPUR)
-    source = "ISO 6336-1 method B, by hand"
+    source = "standard: ISO 6336-1, method B, by hand"
     conformance("c', z = 40/40", 13.549783, found.single_n_per_m2 / N_PER_MM_UM, 1e-6, "N/(mm um)", source)
     conformance("c_gamma, z = 40/40", 20.800961, found.mesh_n_per_m2 / N_PER_MM_UM, 1e-5, "N/(mm um)", source)
     assert found.normal_n_per_m == pytest.approx(found.mesh_n_per_m2 * 0.02, rel=1e-14)
@@ -38,7 +38,7 @@ def test_shifted_helical_pair_by_hand(conformance):
     #    = 0.04723 + 0.00565304 + 0.00390643 - 0.001905 - 0.00127092 - 0.000193 - 0.00036636 + 0.0004761 + 0.0000182
     #    = 0.05354849; c' = 0.8 x 0.975 x 0.9659258 / 0.05354849 = 14.069906
     found = mesh_stiffness(SHIFTED)
-    source = "ISO 6336-1 method B, by hand"
+    source = "standard: ISO 6336-1, method B, by hand"
     # Seven digits of the hand's figures.
     conformance("c', z = 25/60, 15 deg", 14.069906, found.single_n_per_m2 / N_PER_MM_UM, 2e-5, "N/(mm um)", source)
 
@@ -48,7 +48,7 @@ def test_first_example_of_the_technical_report(conformance):
     # Its tips are rounded to what a drawing has: 0.03 % in the contact ratio.
     pair = GearGeometry((17, 103), 8e-3, math.radians(20), math.radians(15.8), (0.145, 0.0), 1.0, 0.4, 0.1)
     found = mesh_stiffness(pair)
-    source = "ISO/TR 6336-30:2017, example 1"
+    source = "standard: ISO/TR 6336-30:2017, example 1"
     conformance("c'", 12.37047, found.single_n_per_m2 / N_PER_MM_UM, 0.0001, "N/(mm um)", source)
     conformance("c_gamma_alpha", 17.46485, found.mesh_n_per_m2 / N_PER_MM_UM, 0.0004 * 17.46, "N/(mm um)", source)
 
@@ -61,7 +61,7 @@ def test_typical_gears_have_about_the_simplified_stiffness(teeth, helix_deg, shi
     # ISO 6336-1, method C: c' = 14 and c_gamma = 20 N/(mm um) for steel, 1.2 < epsilon < 1.9, rough by its own word.
     pair = GearGeometry(teeth, 4e-3, math.radians(20), math.radians(helix_deg), shift, 1.0, 0.25, 0.05)
     found = mesh_stiffness(pair)
-    source = "ISO 6336-1 method C"
+    source = "standard: ISO 6336-1, method C"
     conformance(f"c', {teeth}, {helix_deg} deg", 14.0, found.single_n_per_m2 / N_PER_MM_UM, 1.4, "N/(mm um)", source)
     conformance(f"c_gamma, {teeth}, {helix_deg} deg", 20.0, found.mesh_n_per_m2 / N_PER_MM_UM, 3.0, "N/(mm um)", source)
 

@@ -130,7 +130,7 @@ def ross(system, tmp_path_factory):
     )
     assert done.returncode == 0, done.stderr[-2000:]
     result = json.loads(done.stdout.split("RESULT", 1)[1])
-    return {**result, "source": f"ROSS {result['version']}"}
+    return {**result, "source": f"program: ROSS {result['version']}"}
 
 
 def test_natural_frequencies(conformance, system, ross):

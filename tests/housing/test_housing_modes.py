@@ -27,14 +27,16 @@ def one_mode(natural_hz=100.0):
     return HousingModes(small_box(), 500.0, 1, np.array([natural_hz]), seats, surface, np.ones((1, 3)), 50.0)
 
 
-def test_the_response_of_one_mode_is_that_of_an_oscillator():
+def test_the_response_of_one_mode_is_that_of_an_oscillator(conformance):
     modes = one_mode()
     frequency = np.array([0.5, 100.0, 400.0])
     forces = np.zeros((4, 3, 3), dtype=complex)
     forces[2, 1] = 3.0
     omega = 2.0 * np.pi * frequency
     expected = 1j * omega * 0.6 / ((200.0 * np.pi) ** 2 * (1.0 + 0.05j) - omega**2)
-    assert modes.response(frequency, forces, loss_factor=0.05)[0] == pytest.approx(expected)
+    off = np.abs(modes.response(frequency, forces, loss_factor=0.05)[0] / expected - 1.0).max()
+    source = "analytic: oscillator with a structural loss factor"
+    conformance("velocity of one mode under a force, worst of 3 frequencies", 0.0, off, 1e-9, "1", source)
     at_rest = modes.response([100.0], forces[..., 1:2])  # the box's loss factor, 0.02: velocity and force in phase
     assert at_rest[0, 0] == pytest.approx(0.6 / (200.0 * np.pi * 0.02))
     assert np.abs(modes.normal_at([[0.5, 0.3, 0.2]], [[0.0, 1.0, 0.0]])) == pytest.approx(1.0)
@@ -191,14 +193,13 @@ def test_the_correction_lies_above_the_modes(modes):
 
 
 @pytest.mark.parametrize(("faces", "order", "factor"), [("quadrilaterals", 4, 1.0), ("triangles", 5, 1.3)])
-def test_a_second_discretisation_has_the_same_modes(modes, conformance, faces, order, factor):
+def test_a_second_discretisation_has_the_same_modes(modes, faces, order, factor):
     box, reach = small_box(), MODES_BEYOND * HIGHEST_HZ
     other = box_structure(box, box_grid(box, factor * edge_for(box, reach), faces), order)
     found, _ = natural_modes(other, reach, expected_modes(box, reach))
     assert len(found) == modes.natural
     off = float(np.abs(natural(modes) / found - 1.0).max())
-    what = f"modes of a small box, {faces}, order {order}, edges times {factor}"
-    conformance(what, 0.0, 100.0 * off, 1.0, "%", "a second discretisation")
+    assert off <= 0.01
 
 
 @pytest.mark.parametrize("edge_m", [0.06, 0.1, 0.18])

@@ -10,7 +10,7 @@ from tdacoustic.housing.plane_grid import circle, rectangle
 
 pytest.importorskip("ngsolve", reason="ngsolve (extra housing) is not installed")
 
-LEISSA = "Leissa, NASA SP-160 (1969) and J. Sound Vib. 31 (1973) 257"
+LEISSA = "literature: Leissa, Vibration of Plates, NASA SP-160 (1969) and J. Sound Vib. 31 (1973) 257"
 THICKNESS_M = 0.005
 ALL = (HELD, HELD, HELD)
 
@@ -41,7 +41,7 @@ def test_a_simply_supported_plate_like_a_wall_of_the_housing(conformance, faces)
     for number in (0, 4, 9, len(expected) - 1):
         what = f"simply supported plate, mode {number + 1}, {faces}"
         one = expected[number]
-        conformance(what, one, bending[number], 0.003 * one, "Hz", "Mindlin, J. Appl. Mech. 18 (1951) 31")
+        conformance(what, one, bending[number], 0.003 * one, "Hz", "literature: Mindlin, J. Appl. Mech. 18 (1951) 31")
     assert np.abs(np.array(bending) / expected - 1.0).max() < 0.003
 
 

@@ -16,7 +16,7 @@ pytest.importorskip("ngsolve", reason="ngsolve (extra housing) is not installed"
 
 LENGTH_M, WIDTH_M, HEIGHT_M = 1.0, 0.04, 0.03
 SHEAR_PA = MODULUS_PA / 2.6
-TIMOSHENKO = "Timoshenko beam, shear factor of Cowper, J. Appl. Mech. 33 (1966) 335"
+TIMOSHENKO = "literature: Timoshenko beam, shear factor of Cowper, J. Appl. Mech. 33 (1966) 335"
 COWPER = 10.0 / 12.0  # ν = 0
 
 
@@ -58,7 +58,7 @@ def test_a_cantilever_swings_as_a_beam(cantilever, conformance):
     assert len(found) == 4
     for number, (one, got) in enumerate(zip(sorted(expected), found, strict=True)):
         # Euler and Bernoulli leave out shear and turning, 0.6 % at the second modes here
-        conformance(f"cantilever, mode {number + 1}", one, got, 0.008 * one, "Hz", "Euler-Bernoulli beam")
+        conformance(f"cantilever, mode {number + 1}", one, got, 0.008 * one, "Hz", "analytic: Euler-Bernoulli beam")
 
 
 @pytest.mark.parametrize("thickness_m", [0.05, 0.1])
@@ -69,7 +69,9 @@ def test_lames_mode_of_a_square_block_is_met(conformance, thickness_m):
     found = plate_modes(rectangle(side, side, 0.07), thickness_m, 0.07, 1.1 * expected, {"plate": (soft,) * 3})
     got = found[np.abs(found - expected).argmin()]
     what = f"Lamé's mode of a block of {thickness_m:g} m"
-    conformance(what, expected, got, 5e-4 * expected, "Hz", "G. Lamé, Leçons sur la théorie de l'élasticité (1852)")
+    conformance(
+        what, expected, got, 5e-4 * expected, "Hz", "literature: G. Lamé, Leçons sur la théorie de l'élasticité (1852)"
+    )
 
 
 @pytest.fixture(scope="module")

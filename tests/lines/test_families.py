@@ -25,7 +25,7 @@ def test_two_interleaved_families_are_told_apart(seed, conformance):
             family.fundamental_hz,
             4 * 0.02 / np.sqrt(14),
             "Hz",
-            "simulation",
+            "known input: harmonics with drawn errors",
         )
         assert family.chance < 1e-3
 

@@ -8,6 +8,8 @@ import pytest
 from tdacoustic.lines import find_lines, local_floor
 from tdacoustic.spectra import FramePowerMeter, average_spectrum, plan_frames
 
+PUT_IN = "known input: sine in white noise"
+
 RATE, SECONDS = 8192.0, 20
 N = int(RATE * SECONDS)
 T = np.arange(N) / RATE
@@ -57,7 +59,7 @@ def test_frequency_level_and_prominence_come_back_with_honest_errors(prominence,
     assert 0.8 < np.std(scores) < 1.3, np.std(scores)
     assert abs(np.mean(scores)) < 0.35
     if prominence >= 10:
-        source = f"simulation: {seeds} seeds"
+        source = f"known input: sine in white noise, {seeds} seeds"
         conformance(f"bias of a line's level at {prominence} dB", 0.0, float(np.mean(levels)), 0.2, "dB", source)
         conformance(f"prominence at {prominence} dB", prominence, float(np.mean(prominences)), 0.5, "dB", source)
 
@@ -67,11 +69,9 @@ def test_a_line_between_two_lines_of_the_spectrum_is_as_good(offset, conformance
     x = np.random.default_rng(1).standard_normal(N) + sine(700.0 + offset, rms_of_prominence(60.0))
     (line,) = find_lines(spectrum_of(x))
     # 60 dB over the floor: scatter of 5e-5 Hz and 0.005 dB.
-    conformance(
-        f"frequency of a sine at 700 Hz + {offset:g}", 700.0 + offset, line.frequency_hz, 2e-4, "Hz", "analytic"
-    )
+    conformance(f"frequency of a sine at 700 Hz + {offset:g}", 700.0 + offset, line.frequency_hz, 2e-4, "Hz", PUT_IN)
     level = 20.0 * math.log10(line.rms / rms_of_prominence(60.0))
-    conformance(f"level of a sine at 700 Hz + {offset:g}", 0.0, level, 0.02, "dB", "analytic")
+    conformance(f"level of a sine at 700 Hz + {offset:g}", 0.0, level, 0.02, "dB", PUT_IN)
     assert line.width_hz == 0.0
 
 
@@ -188,7 +188,7 @@ def test_the_floor_is_the_density_of_the_noise(conformance):
         ratios.append(local_floor(spectrum_of(x))[30:-30] / (2.0 / RATE))
     got = 10.0 * math.log10(float(np.mean(ratios)))
     # Lines fill 5 to 15 % of the median's window, which raises it by up to 0.2 dB.
-    conformance("floor under 44 lines in white noise", 0.0, got, 0.3, "dB", "analytic: white")
+    conformance("floor under 44 lines in white noise", 0.0, got, 0.3, "dB", "known input: white noise of known density")
 
 
 def test_nothing_and_silence_have_no_lines():

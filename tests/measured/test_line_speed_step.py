@@ -71,7 +71,14 @@ def test_a_speed_that_no_channel_tells_is_read_from_lines(tmp_path, conformance)
     (profile,) = speed.profiles
     assert (profile.channel, profile.shaft, profile.source) == ("lines of acc0", "motor", "lines")
     assert speed.lines.reason is None and speed.lines.channels == ("acc0",)
-    conformance("run-up from lines, as a step, rms", 0.0, rms_off(profile, 100.0), 2e-4, "1", "analytic")
+    conformance(
+        "run-up from lines, as a step, rms",
+        0.0,
+        rms_off(profile, 100.0),
+        2e-4,
+        "1",
+        "known input: vibration of a known speed",
+    )
     assert speed.angle_of("motor").channel == "lines of acc0"
     assert profile.known_share(100.0, 112.0) > 0.9 and np.median(profile.confidence) > 0.9
     assert {"mesh x1", "mesh x2", "mesh x3"} <= {name for name, part in speed.lines.heard if part > 0.5}

@@ -14,6 +14,8 @@ from tdacoustic.measured.results import RunSpeed
 from tdacoustic.orders import FrequencyCurve, NamedOrder
 from tdacoustic.speed import ShaftAngle, SpeedProfile
 
+PUT_IN = "known input: orders of known level and phase over a made-up run-up"
+
 RATIO = 31.0 / 104.0
 RUN = RunUp(10.0, 30.0, 40.0)
 MESH = NamedOrder("mesh x1", "mesh", 31.0, "motor")
@@ -86,7 +88,7 @@ def test_levels_of_known_orders_come_back(found, name, conformance):
         inner = slice(1, -1)  # the first and the last class hold few frames
         error_db = 10.0 * np.log10(levels.mean_square[inner] / (gain * RMS[name]) ** 2)
         what = f"{name} over a run-up, {channel.channel}: worst error of {error_db.size} speeds"
-        conformance(what, 0.0, np.abs(error_db).max(), 0.15, "dB", "analytic")
+        conformance(what, 0.0, np.abs(error_db).max(), 0.15, "dB", PUT_IN)
         assert levels.usable.all()
         assert set(levels.reasons) == {""}
     assert 10 <= levels.speeds_hz.size <= 40
@@ -100,7 +102,7 @@ def test_the_order_that_nobody_named_is_found_and_named_so(found):
 def test_phases_come_back_where_they_are_steady(found, conformance):
     phases = of(found.channels[0], "mesh x1").phase_rad[1:-1]
     conformance("phase of an order over a run-up, worst", 0.5, phases[np.argmax(np.abs(phases - 0.5))], 0.03, "rad",
-                "analytic")  # fmt: skip
+                PUT_IN)  # fmt: skip
 
 
 def test_the_strongest_are_tracked_jointly_and_agree(found, conformance):
@@ -112,7 +114,7 @@ def test_the_strongest_are_tracked_jointly_and_agree(found, conformance):
         good = np.array([reason == "" for reason in levels.reasons])
         error_db = 10.0 * np.log10(levels.mean_square[good] / RMS[name] ** 2)
         assert good.mean() > 0.8
-        conformance(f"{name} by filter, worst", 0.0, np.abs(error_db).max(), 0.1, "dB", "analytic")
+        conformance(f"{name} by filter, worst", 0.0, np.abs(error_db).max(), 0.1, "dB", PUT_IN)
         assert levels.bandwidth == pytest.approx(2.0 * channel.tracks[0].bandwidth_hz / levels.speeds_hz)
 
 
@@ -192,7 +194,7 @@ def test_a_tacho_that_falls_silent_and_gaps_in_the_log_leave_the_rest(monkeypatc
     silent = (levels.speeds_hz > 18.0) & (levels.speeds_hz < 20.7)  # 15 to 22 s are 17.5 to 21 turns/s
     assert not silent.any() and good.mean() > 0.9
     worst = np.abs(10.0 * np.log10(levels.mean_square[good])).max()
-    conformance("mesh x1 beside a silent tacho and a gap", 0.0, worst, 0.2, "dB", "analytic")
+    conformance("mesh x1 beside a silent tacho and a gap", 0.0, worst, 0.2, "dB", PUT_IN)
     track = of(result.channels[0], "mesh x1", "vold_kalman")
     assert all(reason or np.isfinite(value) for reason, value in zip(track.reasons, track.mean_square, strict=True))
 
@@ -250,10 +252,10 @@ def test_what_repeats_every_turn_and_what_is_left(steady, conformance):
     motor, wheelset = steady.channels[0].averages
     assert (motor.shaft, wheelset.shaft) == ("motor", "wheelset")
     lines = np.abs(motor.amplitudes)
-    conformance("mesh in the synchronous average", 1.0, lines[31], 0.005, "", "analytic")
-    conformance("its sidebands", 0.15, 0.5 * (lines[30] + lines[32]), 0.005, "", "analytic")
+    conformance("mesh in the synchronous average", 1.0, lines[31], 0.005, "", PUT_IN)
+    conformance("its sidebands", 0.15, 0.5 * (lines[30] + lines[32]), 0.005, "", PUT_IN)
     # The average of N turns keeps 1/N of what does not repeat: 600 turns, so 0.25 % of 0.7²/2 at most.
-    conformance("residual: the line that does not turn", 0.245, motor.residual_mean_square, 0.01, "", "analytic")
+    conformance("residual: the line that does not turn", 0.245, motor.residual_mean_square, 0.01, "", PUT_IN)
     assert np.abs(wheelset.amplitudes)[104] == pytest.approx(1.0, abs=0.01)
     assert motor.periods == pytest.approx(600, abs=2)
 
@@ -261,7 +263,7 @@ def test_what_repeats_every_turn_and_what_is_left(steady, conformance):
 def test_sidebands_tell_the_modulation(steady, conformance):
     families = {item.spacing: item.family for item in steady.channels[0].sidebands}
     conformance("amplitude modulation by the motor shaft", 0.3, families["motor shaft"].amplitude_depth[0], 0.01, "",
-                "analytic")  # fmt: skip
+                PUT_IN)  # fmt: skip
     assert families["motor shaft"].pairs[0] == 1 and families["wheelset"].pairs[0] == 0
 
 

@@ -24,14 +24,14 @@ def test_the_run_up_of_ansys(real_recordings, conformance):
     meter = SpeedChannelMeter(rpm.sample_rate_hz)
     meter.take(recording.samples(rpm.name))
     _, speed = meter.result()
-    source = "PROVENANCE.md: vendor chunk of the WAV"
+    source = "recording: Ansys, accel_with_rpm.wav, full scales in its LEA chunk"
     # Mean over 50 ms of a run-up by 190 rpm/s on average; the start is nearly flat.
     conformance("speed at the start", 974.5, 60.0 * speed[0], 5.0, "rpm", source)
     conformance("speed at the end", 4821.4, 60.0 * speed.max(), 10.0, "rpm", source)
     raw, _ = soundfile.read(path, dtype="float64")  # full scale is 1 Pa
     survey = survey_recording(recording.only([mic.name]), bands=False)
     rms = math.sqrt(float(survey.rasters[0].statistics.mean_square[0]))
-    conformance("rms of the pressure", float(raw[:, 0].std()), rms, 1e-9, "Pa", "soundfile and numpy")
+    conformance("rms of the pressure", float(raw[:, 0].std()), rms, 1e-9, "Pa", "program: soundfile and numpy")
 
 
 def test_the_motor_of_mosqito(real_recordings, conformance):
@@ -44,7 +44,7 @@ def test_the_motor_of_mosqito(real_recordings, conformance):
     raw = np.asarray(record["data"]).real
     survey = survey_recording(recording)
     rms = math.sqrt(float(survey.rasters[0].statistics.mean_square[0]))
-    conformance("rms of the acceleration", float(raw.std()), rms, 1e-9, "m/s^2", "pyuff and numpy")
+    conformance("rms of the acceleration", float(raw.std()), rms, 1e-9, "m/s^2", "program: pyuff and numpy")
     settings = MeasurementSettings(recording.channels, (), 4.0, 0.03, 50.0, None, ())
     (result,) = measure_run(settings, RunSpeed(()), survey).channels
     other = OctaveFilterBank(fs=51200, fraction=3, order=6, limits=[19.0, 20500.0])
@@ -58,7 +58,7 @@ def test_the_motor_of_mosqito(real_recordings, conformance):
     ]
     assert len(distance) >= 3
     # A tone of 54 dB decides what its neighbours show: those bands are flagged, and are left out here.
-    source = "pyoctaveband.OctaveFilterBank"
+    source = "program: pyoctaveband.OctaveFilterBank"
     conformance("strong third octaves, largest distance", 0.0, float(np.max(np.abs(distance))), 0.2, "dB", source)
 
 
@@ -70,7 +70,14 @@ def test_the_pair_of_pyuff_gives_one_spectrum(real_recordings, conformance):
         samples.append(recording.samples(recording.channels[0].name))
         spectra.append(average_spectrum(survey.rasters[0].powers, 0, "sound_pressure", "Pa"))
     total = 10.0 * math.log10(spectra[0].mean_square() / spectra[1].mean_square())
-    conformance("level, ASCII against binary", 0.0, total, 1e-5, "dB", "pyuff: one record written twice")
+    conformance(
+        "level, ASCII against binary",
+        0.0,
+        total,
+        1e-5,
+        "dB",
+        "recording: pyuff, Sample_UFF58_ascii.uff and Sample_UFF58b_bin.uff, one record twice",
+    )
     # By the triangle inequality the two differ by no more than the spectrum of the samples' difference.
     assert np.max(np.abs(samples[0] - samples[1])) <= 0.5e-5 * np.max(np.abs(samples[1]))  # six digits
     plan = plan_frames(65536.0, samples[0].size)

@@ -42,7 +42,7 @@ def test_a_tacho_gives_its_shafts_speed(tmp_path, conformance):
     speed = speed_of(tmp_path, pulses(17.3))
     (profile,) = speed.profiles
     assert (profile.shaft, profile.si_symbol, profile.doubtful, speed.problems) == ("motor", "1/s", False, ())
-    conformance("speed from a tacho", 17.3, profile.mean, 17.3e-5, "1/s", "analytic")
+    conformance("speed from a tacho", 17.3, profile.mean, 17.3e-5, "1/s", "known input: tacho pulses of known speed")
     assert profile.is_constant(1e-3)
     assert "20 per revolution" in profile.notes[0]
 
@@ -113,7 +113,14 @@ def test_a_run_up_has_an_angle_with_its_channels_name(tmp_path, conformance):
     t = np.linspace(1.0, 19.0, 500)
     turned = angle.turns_at(t) - (5.0 * t + 0.4 * t**2)
     # A flank lasts one and a half samples at 21 turns/s: a fifth of a sample is 4e-4 turns.
-    conformance("angle of a run-up from a tacho, spread", 0.0, float(np.ptp(turned)), 4e-4, "1", "analytic")
+    conformance(
+        "angle of a run-up from a tacho, spread",
+        0.0,
+        float(np.ptp(turned)),
+        4e-4,
+        "1",
+        "known input: tacho pulses of known speed",
+    )
 
 
 def test_a_speed_channel_has_an_angle_and_a_trains_has_none(tmp_path):

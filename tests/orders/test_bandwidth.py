@@ -10,6 +10,8 @@ from tdacoustic.errors import AnalysisError
 from tdacoustic.orders import TrackedOrder, VoldKalman, advise_bandwidth
 from tdacoustic.speed import ShaftAngle
 
+PUT_IN = "known input: an order through a resonance of known loss factor"
+
 RUN = RunUp(10.0, 40.0, 60.0, 4096.0)
 
 
@@ -41,7 +43,7 @@ def test_what_cannot_be_had_is_said():
 
 
 @pytest.mark.parametrize("poles", [1, 2, 3])
-def test_an_order_not_tracked_is_kept_out_by_40_db(poles, conformance):
+def test_an_order_not_tracked_is_kept_out_by_40_db(poles):
     run = RunUp(20.0, 20.0, 30.0, 4096.0)
     advice = advise_bandwidth(angle_of(run), 10.0, [(angle_of(run), 11.0)], poles=poles, joint=False)
     samples = run.order(11.0)
@@ -53,7 +55,7 @@ def test_an_order_not_tracked_is_kept_out_by_40_db(poles, conformance):
     if poles == 1:  # 15 bandwidths away is beyond what the splines of 16 nodes a 1 / B follow: they keep it out too
         assert level < -39.0
         return
-    conformance(f"order not tracked, by {poles} poles of the advised bandwidth", -40.0, level, 1.0, "dB", "design")
+    assert level == pytest.approx(-40.0, abs=1.0)
 
 
 def test_a_resonance_passed_with_the_advised_bandwidth_keeps_its_peak(conformance):
@@ -65,4 +67,4 @@ def test_a_resonance_passed_with_the_advised_bandwidth_keeps_its_peak(conformanc
     advice = advise_bandwidth(angle_of(run), order, loss_factor=loss)
     (found,) = VoldKalman([TrackedOrder(angle_of(run), order, advice.bandwidth_hz)], run.rate_hz).whole(samples[None])
     peak = float(db(np.nanmax(np.abs(found.amplitude[0])) * loss))
-    conformance("peak of a resonance of the loss factor that the bandwidth is for", -0.1, peak, 0.15, "dB", "design")
+    conformance("peak of a resonance passed in a run-up, advised bandwidth", 0.0, peak, 0.25, "dB", PUT_IN)

@@ -17,6 +17,8 @@ from tdacoustic.orders import (
 )
 from tdacoustic.speed import ShaftAngle
 
+PUT_IN = "known input: orders of known level and phase over a made-up run-up"
+
 RUN = RunUp(10.0, 50.0, 20.0)
 
 
@@ -45,7 +47,7 @@ def test_a_line_reads_its_rms_at_each_speed(rows, conformance):
     assert found.resolution == 0.1 and found.frames.requested_resolution == 0.1
     level = np.sqrt(found.mean_square[0, :, 120])
     conformance(f"rms of an order on a line, {type(rows).__name__}", 0.3, float(level[np.argmax(np.abs(level - 0.3))]),
-                0.0003, "1", "analytic")  # fmt: skip
+                0.0003, "1", PUT_IN)  # fmt: skip
     assert np.allclose(found.band(11.8, 12.2)[0], 0.09, rtol=2e-3)
 
 
@@ -55,9 +57,11 @@ def test_between_two_lines_hann_falls_by_its_scalloping_and_flat_top_does_not(co
     flat = order_map(RUN, samples, EachFrame(), window="flattop")
     # Hann half a line beside its middle: sinc(1/2) / (1 - 1/4) = 8 / (3 pi).
     expected, level = db(8.0 / (3.0 * np.pi)), float(db(np.sqrt(hann.mean_square[0, :, 120].mean())))
-    conformance("Hann between two lines", expected, level, 0.01, "dB", "analytic")
+    conformance(
+        "Hann between two lines", expected, level, 0.01, "dB", "analytic: Hann window half a line beside, 8 / (3 pi)"
+    )
     conformance("flat-top between two lines", 0.0, float(db(np.sqrt(flat.mean_square[0, :, 120].mean()))), 0.02, "dB",
-                "published: flat to 0.02 dB")  # fmt: skip
+                PUT_IN)  # fmt: skip
     assert np.allclose(hann.band(11.8, 12.3), 1.0, rtol=0.01)
     assert (hann.frames.noise_lines, round(flat.frames.noise_lines, 3)) == (1.5, 3.770)
 

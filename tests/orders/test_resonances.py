@@ -57,7 +57,12 @@ def test_a_resonance_is_found_with_its_loss_factor(frequency_hz, loss, conforman
     (found,) = found_in(driven + resonator(driven, frequency_hz, loss, 5.0))
     assert found.kind == "resonance" and found.orders_raised >= 2 and found.confidence > 0.9
     conformance(
-        f"resonance at {frequency_hz:g} Hz", frequency_hz, found.frequency_hz, 0.02 * frequency_hz, "Hz", "analytic"
+        f"resonance at {frequency_hz:g} Hz",
+        frequency_hz,
+        found.frequency_hz,
+        0.02 * frequency_hz,
+        "Hz",
+        "known input: a resonator of known frequency driven by orders",
     )
     # Classes of 0.35 turns/s and frames of 5 turns broaden it: an upper bound, within a factor of two.
     assert 0.8 * loss < found.loss_factor < 2.0 * loss

@@ -45,7 +45,12 @@ def test_depths_of_amplitude_and_phase_modulation(amplitude, phase, conformance)
         worst = depths[np.argmax(np.abs(depths - expected))]
         # The first pair of a phase modulation is J1/J0: 0.1 % beyond β at 0.1; cross terms of both: their product.
         conformance(
-            f"{name} modulation beside ({amplitude:g}, {phase:g})", expected, float(worst), 0.003, "1", "analytic"
+            f"{name} modulation beside ({amplitude:g}, {phase:g})",
+            expected,
+            float(worst),
+            0.003,
+            "1",
+            "known input: modulation of known depth",
         )
     assert np.all(found.pairs >= 1) and all(reason == "" for reason in found.reasons)
     assert found.power_ratio[0] == pytest.approx(0.5 * (amplitude**2 + phase**2), rel=0.05)

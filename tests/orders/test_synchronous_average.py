@@ -8,6 +8,8 @@ from tdacoustic.errors import AnalysisError
 from tdacoustic.orders import AngleResampler, SynchronousMeter
 from tdacoustic.speed import ShaftAngle
 
+PUT_IN = "known input: orders of known level and phase over a made-up run-up"
+
 RUN = RunUp(10.0, 30.0, 40.0)
 
 
@@ -28,10 +30,10 @@ def test_orders_keep_amplitude_and_phase_and_others_go(conformance):
     found, _ = averaged(samples)
     assert found.periods[0] > 780
     amplitude = found.amplitudes[0]
-    conformance("synchronous average, order 5, rms", 0.5, float(abs(amplitude[5])), 0.002, "1", "analytic")
-    conformance("synchronous average, order 5, phase", 0.7, float(np.angle(amplitude[5])), 0.005, "rad", "analytic")
-    conformance("synchronous average, order 31, rms", 0.1, float(abs(amplitude[31])), 0.002, "1", "analytic")
-    conformance("synchronous average, order 31, phase", -1.0, float(np.angle(amplitude[31])), 0.02, "rad", "analytic")
+    conformance("synchronous average, order 5, rms", 0.5, float(abs(amplitude[5])), 0.002, "1", PUT_IN)
+    conformance("synchronous average, order 5, phase", 0.7, float(np.angle(amplitude[5])), 0.005, "rad", PUT_IN)
+    conformance("synchronous average, order 31, rms", 0.1, float(abs(amplitude[31])), 0.002, "1", PUT_IN)
+    conformance("synchronous average, order 31, phase", -1.0, float(np.angle(amplitude[31])), 0.02, "rad", PUT_IN)
     left = np.delete(np.abs(amplitude), [5, 31])
     assert left.max() < 0.01  # 0.3 of order 7.4 and the noise, over 800 turns
     stated = found.error.mean()

@@ -25,7 +25,7 @@ def test_iso_9613(conformance, air):
     for frequency, printed, ours in zip((63, 125, 250, 500, 1000, 2000, 4000, 8000), PRINTED[air], found, strict=True):
         digits = 0.5 if printed > 100.0 else 0.055  # half of the last printed digit, and a tenth of it
         name = f"absorption of air at {degrees} °C, {humidity} %, {frequency} Hz"
-        conformance(name, printed, ours, digits, "dB/km", "ISO 9613-2:1996, Table 2")
+        conformance(name, printed, ours, digits, "dB/km", "standard: ISO 9613-2:1996, Table 2")
 
 
 @pytest.mark.parametrize(("kelvin", "humidity"), [(0.0, 50.0), (290.0, -1.0), (290.0, 101.0), (290.0, float("nan"))])

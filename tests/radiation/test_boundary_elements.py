@@ -9,7 +9,7 @@ from tdacoustic.radiation.grids import sphere_surface
 from tdacoustic.radiation.surfaces import Surface
 
 IMPEDANCE = 413.0
-SOURCE = "series of the sphere in spherical Hankel functions"
+SOURCE = "analytic: series of the sphere in spherical Hankel functions"
 RESONANCES = (np.pi, 4.493409, 2.0 * np.pi, 7.725252)  # zeros of j0 and j1: of the space inside with p = 0 on its wall
 
 

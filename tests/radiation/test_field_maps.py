@@ -60,7 +60,7 @@ def test_sources_inside_up_to_the_walls(body, conformance, frequency_hz, distanc
     exact = field_of(points, wave)[0]
     error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
     name = f"sources in a box, {frequency_hz:.0f} Hz, {1e3 * distance_m:.0f} mm off its walls: L2 error"
-    conformance(name, 0.0, 100.0 * error, 100.0 * most, "%", "point sources in free space")
+    conformance(name, 0.0, 100.0 * error, 100.0 * most, "%", "analytic: point sources in free space")
 
 
 def test_a_point_source_before_a_wide_rigid_wall_has_its_image(conformance):
@@ -77,7 +77,14 @@ def test_a_point_source_before_a_wide_rigid_wall_has_its_image(conformance):
     )
     worst = np.abs(20.0 * np.log10(np.abs(found / exact))).max()
     # the edges of the wall, 3 m off, send back a hundredth: 0.6 dB of a wall of 4 m, 0.16 dB of 6 m
-    conformance("source 0.3 m before a rigid wall: level along the normal", 0.0, worst, 0.25, "dB", "image source")
+    conformance(
+        "source 0.3 m before a rigid wall: level along the normal",
+        0.0,
+        worst,
+        0.25,
+        "dB",
+        "analytic: image source of a rigid wall",
+    )
 
 
 def test_away_from_the_walls_it_is_what_boundary_elements_give(body):

@@ -31,7 +31,7 @@ def test_a_small_body_that_breathes_is_a_source_and_its_image(conformance, wave_
     error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
     # the flat panels 1 %, and what the sphere scatters of its own image
     name = f"breathing sphere over ground, k = {wave_number:g} rad/m: L2 error"
-    conformance(name, 0.0, 100.0 * error, 2.0, "%", "image source")
+    conformance(name, 0.0, 100.0 * error, 2.0, "%", "analytic: breathing sphere and its image")
 
 
 def test_the_housing_over_ground_is_two_bodies_with_a_mirror_plane_between():
@@ -82,7 +82,7 @@ def test_the_power_of_a_breathing_housing_is_that_of_a_source_and_its_image(brea
     got = 10.0 * math.log10(half / (2.0 * free))  # half of the sphere for the same power is twice the mean square
     # at 80 Hz the path to the image is 0.24 wavelengths, and the walls are a fifth of one
     name = f"power of the breathing housing over ground against free space, {frequency:.0f} Hz"
-    conformance(name, wanted, got, 0.12, "dB", "monopole and image: 1 + sin(2kh) / (2kh)")
+    conformance(name, wanted, got, 0.12, "dB", "analytic: monopole and image: 1 + sin(2kh) / (2kh)")
 
 
 def test_low_frequencies_gain_six_decibels_on_the_half_sphere(breathing):

@@ -12,10 +12,10 @@ HERE = (0.0, 0.0, 0.0)
 
 
 def test_power_and_level_at_4_m(conformance):
-    source = "physics.md section 8"
+    source = "analytic: 10 lg of the area of a sphere, of half a sphere"
     conformance("power from the 4 m average, sphere", 23.03, -mean_over_sphere_db(4.0), 0.005, "dB", source)
     conformance("power from the 4 m average, half space", 20.02, -mean_over_sphere_db(4.0, "half"), 0.005, "dB", source)
-    conformance("power from the level at 1 m", 11.0, -mean_over_sphere_db(1.0), 0.01, "dB", "physics.md section 4")
+    conformance("power from the level at 1 m", 11.0, -mean_over_sphere_db(1.0), 0.01, "dB", "analytic: 10 lg(4 pi)")
 
 
 def test_twice_the_distance_is_six_decibels_less():
@@ -66,8 +66,12 @@ def test_both_readings_of_equation_7():
 
 def test_air_at_20_degrees(conformance):
     air = Air(293.15)
-    conformance("speed of sound at 20 °C", 343.2, air.sound_speed_m_s, 0.1, "m/s", "ISO 9613-1")
-    conformance("density at 20 °C", 1.204, air.density_kg_m3, 0.001, "kg/m³", "standard air")
+    conformance(
+        "speed of sound at 20 °C", 343.2, air.sound_speed_m_s, 0.1, "m/s", "standard: ISO 9613-1:1993, speed of sound"
+    )
+    conformance(
+        "density at 20 °C", 1.204, air.density_kg_m3, 0.001, "kg/m³", "analytic: p / (R T) of dry air at 101.325 kPa"
+    )
 
 
 def test_what_cannot_be_is_refused():

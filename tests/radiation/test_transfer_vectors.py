@@ -57,7 +57,7 @@ def points(body, parts):
 
 
 @pytest.mark.parametrize("frequency_hz", [23.0, 111.0, 333.0, 527.0, 693.0])
-def test_levels_between_the_computed_frequencies(body, mean, points, frequency_hz, conformance):
+def test_levels_between_the_computed_frequencies(body, mean, points, frequency_hz):
     """0.1 dB: far panels enter boundary elements by one point each, the vectors by four."""
     surface = body.surface(1000.0)
     problem = ExteriorProblem(surface, body.wave_number_rad_m(frequency_hz), IMPEDANCE)
@@ -66,8 +66,7 @@ def test_levels_between_the_computed_frequencies(body, mean, points, frequency_h
     velocity = (shapes(surface) @ q)[:, None]
     there = rule.mean_square(problem.transfer(rule.points_m, velocity))[0]
     here = mean.of_modes(frequency_hz, q)
-    name = f"mean at 4 m at {frequency_hz:g} Hz against a direct solve"
-    conformance(name, 0.0, 10.0 * math.log10(here / there), 0.1, "dB", "boundary elements at that frequency")
+    assert abs(10.0 * math.log10(here / there)) <= 0.1
     direct = np.abs(problem.transfer([FAR, NEAR], velocity)[:, 0]) ** 2
     assert 10.0 * np.log10(points.of_modes(frequency_hz, q) / direct) == pytest.approx([0.0, 0.0], abs=0.2)
     rigid = problem.scattered(SOURCES, rule.points_m)
@@ -90,7 +89,14 @@ def test_reciprocity_of_the_vectors(body, points, conformance):
         wanted = abs((surface.areas_m2 * shape) @ blocked / volume_flow) ** 2
         got = points.of_modes(frequency, np.eye(4)[mode])[0]
         name = f"reciprocity of transfer vector {mode + 1} at {frequency:.0f} Hz"
-        conformance(name, 0.0, 10.0 * math.log10(got / wanted), 0.25, "dB", "a point source's blocked field")
+        conformance(
+            name,
+            0.0,
+            10.0 * math.log10(got / wanted),
+            0.25,
+            "dB",
+            "law: reciprocity with a point source's blocked field",
+        )
 
 
 def test_the_means_are_hermitian_and_positive(mean):

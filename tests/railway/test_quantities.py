@@ -73,7 +73,7 @@ def test_the_pass_by_level_of_a_line_of_sources(passing, conformance):
     t = np.linspace(FRONT_S, FRONT_S + TP_S, 20001)
     expected = 10.0 * math.log10(0.5 * np.mean(line_of_sources(t)) / 20e-6**2)
     # Intervals of 10 ms at both ends, the filter at 1 kHz: 0.02 dB.
-    source = "analytic: incoherent sources along a moving line"
+    source = "known input: incoherent sources along a moving line"
     conformance("LpAeq,Tp of a unit of 100 m at 80 km/h, 7.5 m", expected, got.level_db, 0.02, "dB", source)
     # The integral over all time is Tp: each source passes with the energy of d/v, of which the line has L/d.
     exposure = transit_exposure(passing, 0, WAYSIDE, PASSAGE, ISO_3095_2013)
@@ -150,7 +150,7 @@ def test_a_near_background_is_corrected_beside_the_level_and_never_in_it(passing
     near = Conditions(**{**WAYSIDE.__dict__, "background_db": plain.level_db - 6.0})
     got = pass_by(passing, 0, near, PASSAGE, ISO_3095_2013)
     assert got.level_db == plain.level_db and plain.corrected_db is None
-    source = "ISO 3095:2013, D.4.2, formula (D.1) (phonometry)"
+    source = "standard: ISO 3095:2013, D.4.2, formula (D.1), as quoted by the program phonometry"
     conformance("background 6 dB below", -1.26, got.corrected_db - got.level_db, 0.005, "dB", source)
     too_near = Conditions(**{**WAYSIDE.__dict__, "background_db": plain.level_db - 3.0})
     assert pass_by(passing, 0, too_near, PASSAGE, ISO_3095_2013).corrected_db is None
@@ -169,7 +169,7 @@ def test_a_record_cut_at_the_unit_lacks_its_margins():
 
 
 def test_standing_starting_and_braking(conformance):
-    source = "analytic: sine of 1 kHz"
+    source = "known input: sine of 1 kHz"
     level = 10.0 * math.log10(0.5 / 20e-6**2)
     steady = history(sine(21.0))
     standing = Conditions(place="wayside", distance_m=7.5, height_m=1.2, highest_km_h=0.0, background_db=60.0)

@@ -25,7 +25,7 @@ TABLE_G2 = (  # correction and standard uncertainty of each input, dB: ISO 3095:
 
 def test_the_printed_budget(conformance):
     got = expanded_uncertainty_db(55.0, [row[0] for row in TABLE_G2], [row[1] for row in TABLE_G2])
-    source = "ISO 3095:2013, table G.2 (phonometry)"
+    source = "standard: ISO 3095:2013, table G.2, as quoted by the program phonometry"
     conformance("level of the budget", 55.68, got.level_db, 0.005 + 1e-9, "dB", source)
     conformance("standard uncertainty", 0.83, got.standard_db, 0.005, "dB", source)
     conformance("expanded uncertainty", 1.66, got.expanded_db, 0.01, "dB", source)
@@ -36,7 +36,14 @@ def test_the_tolerance_of_the_distance_is_that_of_table_g1(conformance):
     tolerance = ISO_3095_2013.value("position_tolerance_m")
     for distance, half_width in ((7.5, 0.23), (25.0, 0.07)):
         got = 20.0 * math.log10(1.0 + tolerance / distance)
-        conformance(f"{distance:g} m", half_width, got, 0.005, "dB", "ISO 3095:2013, table G.1 (phonometry)")
+        conformance(
+            f"half-width of the distance's tolerance at {distance:g} m",
+            half_width,
+            got,
+            0.005,
+            "dB",
+            "standard: ISO 3095:2013, table G.1, as quoted by the program phonometry",
+        )
 
 
 def test_three_runs_are_averaged_and_rounded():

@@ -208,3 +208,16 @@ def test_wrong_documents_are_refused() -> None:
         Table("t", "", COLUMNS, [("a", 3, "guess", "ok", True)])
     with pytest.raises(ReportError, match="kind of a notice"):
         Notice("shout", "text")
+
+
+def test_a_page_that_holds_no_more_pictures_says_which_it_leaves_out():
+    blocks = [FigureBlock(spectrum(f"figure-{n}", f"word {n}", 301), "measured") for n in range(5)]
+    page = render_html(
+        Document("Report", "", "measured", sections=[Section("one", "One", blocks)]),
+        max_interactive=1,
+        max_picture_bytes=40_000,
+    )
+    kept = page.count("data:image/png;base64,")
+    assert 1 <= kept < 5
+    assert page.count("Left out: the page holds no more pictures") == 5 - kept
+    assert f"The last {5 - kept} are left out" in page and "Figure 5. Spectrum word 4. Left out" in page

@@ -334,7 +334,7 @@ def test_assumed_and_given_parameters_are_told_apart(judged):
 def test_the_report_begins_with_the_answer_and_folds_the_runs(judged):
     document = measured_report(judged)
     names = [section.id for section in document.sections]
-    assert names[:3] == ["side-by-side", "sources", "contributions"]
+    assert names[:3] == ["side-by-side", "listening", "sources"]
     spectra = document.sections[names.index("spectra")]
     assert sum(isinstance(block, Details) for block in spectra.blocks) == 2
     assert not any(isinstance(block, Section) for block in spectra.blocks)

@@ -30,10 +30,17 @@ def check(*plateaus, scale=STATED, **keys):
 
 
 def test_what_calibrators_give(conformance):
-    conformance("94 dB re 20 uPa", 1.00237, parse_calibrator("94 dB").rms, 5e-6, "Pa", "20 uPa x 10^(94/20)")
-    conformance("1 Pa", 93.9794, parse_calibrator("1 Pa").level_db, 5e-5, "dB", "IEC 60942: 94 dB is about 1 Pa")
-    conformance("1 g peak", 6.93435, parse_calibrator("1 g peak").rms, 5e-6, "m/s²", "9.80665 / sqrt 2")
-    conformance("usual frequency", 1000 / (2 * math.pi), parse_calibrator("10 m/s^2").usual_hz[0], 1e-3, "Hz", "1000/s")
+    conformance("94 dB re 20 uPa", 1.00237, parse_calibrator("94 dB").rms, 5e-6, "Pa", "analytic: 20 uPa x 10^(94/20)")
+    conformance("1 Pa", 93.9794, parse_calibrator("1 Pa").level_db, 5e-5, "dB", "analytic: 20 lg(1 Pa / 20 uPa)")
+    conformance("1 g peak", 6.93435, parse_calibrator("1 g peak").rms, 5e-6, "m/s²", "analytic: 9.80665 m/s² / sqrt 2")
+    conformance(
+        "usual frequency",
+        1000 / (2 * math.pi),
+        parse_calibrator("10 m/s^2").usual_hz[0],
+        1e-3,
+        "Hz",
+        "analytic: 1000 rad/s",
+    )
     assert parse_calibrator("114.0 dB re 20 µPa").quantity == "sound_pressure"
     assert parse_calibrator("10 m/s²").rms == 10.0
     assert parse_calibrator("20 m/s^2 pp").rms == pytest.approx(10.0 / math.sqrt(2.0))

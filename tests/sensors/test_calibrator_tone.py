@@ -57,10 +57,11 @@ def level_error_db(plateau, rms=1.0):
         (1000.0, 0.3, 48000.0, 0.02),  # noise 10 dB below the tone, which a wide band would read 0.4 dB too high
     ],
 )
-def test_level_and_frequency_of_a_sine(hz, noise, rate, tolerance_db):
+def test_level_and_frequency_of_a_sine(hz, noise, rate, tolerance_db, conformance):
     (plateau,), _ = read(tone(hz=hz, noise=noise, rate=rate, thump=0.0), (hz,), rate)
-    assert abs(level_error_db(plateau)) < tolerance_db
-    assert abs(plateau.frequency_hz / hz - 1.0) < 2e-5
+    source = f"known input: a calibrator's tone of {hz:g} Hz, noise of {noise:g} of it"
+    conformance("level of a calibrator's tone", 0.0, level_error_db(plateau), tolerance_db, "dB", source)
+    conformance("frequency of a calibrator's tone", hz, plateau.frequency_hz, 2e-5 * hz, "Hz", source)
     assert plateau.residue_db == pytest.approx(20 * math.log10(noise), abs=1.5) or noise < 1e-3
 
 
@@ -139,9 +140,11 @@ def test_clipping_is_seen_with_and_without_limits():
     assert not read(coarse)[0][0].clipped
 
 
-def test_distortion_is_that_of_the_harmonics():
+def test_distortion_is_that_of_the_harmonics(conformance):
     t = times(20.0)
     signal = np.sin(2 * np.pi * 1000.0 * t) + 0.05 * np.sin(2 * np.pi * 3000.0 * t)
     (plateau,) = read(signal)[0]
-    assert plateau.distortion == pytest.approx(0.05, rel=0.01)
+    conformance(
+        "distortion", 0.05, plateau.distortion, 0.0005, "1", "known input: a sine and 5 % of its third harmonic"
+    )
     assert abs(level_error_db(plateau, math.sqrt(0.5))) < 0.001

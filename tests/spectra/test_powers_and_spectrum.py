@@ -33,14 +33,14 @@ def test_a_sine_on_a_line_has_its_rms_and_level(rate, conformance):
     t = np.arange(int(4 * rate)) / rate
     spectrum = spectrum_of(math.sqrt(2.0) * np.sin(2 * np.pi * 1000.0 * t + 0.7), rate)
     rms, at = spectrum.values("rms"), round(1000.0 / spectrum.resolution_hz)
-    conformance(f"rms of a 1 Pa sine on a line at {rate:g} Hz", 1.0, rms[at], STORED, "Pa", "analytic")
+    conformance(f"rms of a 1 Pa sine on a line at {rate:g} Hz", 1.0, rms[at], STORED, "Pa", "known input: sine of 1 Pa")
     conformance(
         f"level of a 1 Pa sine at {rate:g} Hz",
         93.9794,
         spectrum.levels_db("rms")[at],
         1e-4,
         "dB",
-        "analytic: 20 lg(1/20e-6)",
+        "analytic: 20 lg(1 Pa / 20 uPa)",
     )
     assert np.max(np.delete(rms, [at - 1, at, at + 1])) < 1e-9
     assert rms[at - 1] == pytest.approx(0.5, rel=STORED)  # Hann: half of the amplitude one line beside
@@ -62,7 +62,12 @@ def test_the_density_of_white_noise_is_exact_in_expectation(conformance):
     tolerance = 4.0 * math.sqrt(2.0 / (density.size * spectrum.averages))
     expected = 2.0 * sigma**2 / rate
     conformance(
-        "density of white noise over 2 sigma²/fs", 1.0, density.mean() / expected, tolerance, "1", "analytic: white"
+        "density of white noise over 2 sigma²/fs",
+        1.0,
+        density.mean() / expected,
+        tolerance,
+        "1",
+        "analytic: white noise, 2 sigma² / fs",
     )
     freedom = 2.0 * spectrum.averages
     scaled = freedom * density / expected
@@ -79,7 +84,12 @@ def test_parseval(conformance):
     window = signal.windows.hann(51200, sym=False)
     expected = np.mean((window * x) ** 2) / np.mean(window**2)
     conformance(
-        "mean square over all lines, one frame", expected, spectrum.mean_square(), STORED * expected, "Pa²", "Parseval"
+        "mean square over all lines, one frame",
+        expected,
+        spectrum.mean_square(),
+        STORED * expected,
+        "Pa²",
+        "law: Parseval's theorem",
     )
     long = np.random.default_rng(4).standard_normal(int(40 * rate))
     # 40 s of white noise: variance of a variance is 2/n; the frames' ends are weighted, hence the factor 5.
@@ -89,7 +99,7 @@ def test_parseval(conformance):
         spectrum_of(long, rate).mean_square() / long.var(),
         5.0 * math.sqrt(2.0 / long.size),
         "1",
-        "Parseval",
+        "law: Parseval's theorem",
     )
 
 
@@ -119,7 +129,7 @@ def test_equal_to_welch_of_scipy(rate, overlap, conformance):
         largest,
         1.1 * STORED,  # and double rounding of the smallest of 2e4 lines
         "1",
-        "scipy.signal.welch",
+        "program: scipy.signal.welch",
     )
     assert np.allclose(spectrum.density[:2], density[:2], atol=1e-12 * density.max(), rtol=2 * STORED)
 
@@ -135,7 +145,12 @@ def test_equal_to_librosa(conformance):
     # librosa does not take the mean off, which touches lines 0 and 1 alone.
     largest = float(np.max(np.abs(ours[2:-1] / density[2:-1] - 1.0)))
     conformance(
-        "density against librosa.stft, largest relative distance", 0.0, largest, 1.1 * STORED, "1", "librosa.stft"
+        "density against librosa.stft, largest relative distance",
+        0.0,
+        largest,
+        1.1 * STORED,
+        "1",
+        "program: librosa.stft",
     )
 
 
@@ -175,7 +190,7 @@ def test_the_interval_covers_what_it_says(overlap, seconds, conformance):
         float(np.mean(held)),
         0.015,
         "1",
-        "simulation: white noise",
+        "known input: white noise of known density",
     )
 
 

@@ -42,7 +42,14 @@ def test_a_jerk_leaves_the_stated_error(conformance):
     # A Hermite cubic whose slopes are too steep by J h²/6 at both ends: s(1-s)(1-2s) J h³/6, 0.0160 J h³ at most.
     largest = jerk * step**3 / (36.0 * math.sqrt(3.0))
     ratio = error / (jerk * step**3)
-    conformance("angle between nodes under a jerk, largest error over J h³", 0.01604, ratio, 2e-4, "1", "analytic")
+    conformance(
+        "angle between nodes under a jerk, largest error over J h³",
+        0.01604,
+        ratio,
+        2e-4,
+        "1",
+        "analytic: error of a Hermite cubic with slopes J h²/6 too steep",
+    )
     assert error <= largest * (1.0 + 1e-6)
 
 
@@ -59,10 +66,22 @@ def test_scatter_of_the_edges_is_not_amplified(conformance):
     between = np.std(angle.turns_at(middle) - speed * middle)
     # Weights -1/16, 9/16, 9/16, -1/16: sqrt(164)/16.
     conformance(
-        "angle between scattered edges, over that at the edges", 0.8004, between / at_edges, 0.02, "1", "analytic"
+        "angle between scattered edges, over that at the edges",
+        0.8004,
+        between / at_edges,
+        0.02,
+        "1",
+        "analytic: weights of a Hermite cubic on independent scatter",
     )
     slope = np.std(angle.slopes_hz - speed) / (at_edges * PULSES * speed)
-    conformance("speed at scattered edges, over e/h", 0.7071, slope, 0.02, "1", "analytic")
+    conformance(
+        "speed at scattered edges, over e/h",
+        0.7071,
+        slope,
+        0.02,
+        "1",
+        "analytic: weights of a Hermite cubic on independent scatter",
+    )
 
 
 @pytest.mark.parametrize("scatter", [1e-6, 1e-5, 1e-4])

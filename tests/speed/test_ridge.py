@@ -10,6 +10,8 @@ from tdacoustic.speed import CombOrder, RidgeSearch, RidgeSettings, SpeedProfile
 from tdacoustic.speed.comb import distinct_orders, line_evidence
 from tdacoustic.speed.comb_path import find_path
 
+PUT_IN = "known input: lines of a known speed"
+
 SHARED = Path(__file__).resolve().parents[3] / "shared"
 RATE = 4096.0
 ORDERS = (23.0, 46.0, 69.0, 1.0, 2.0)
@@ -43,9 +45,9 @@ def test_a_run_up_is_read_from_its_lines(conformance):
     got = speed_from_lines("acc", signal(speed), RATE, settings())
     assert got.reason is None and got.profile.unknown == ()
     worst = float(np.max(np.abs(off(got.profile, t, speed))))
-    conformance("run-up from its lines, largest speed error", 0.0, worst, 3e-4, "1", "analytic")
+    conformance("run-up from its lines, largest speed error", 0.0, worst, 3e-4, "1", PUT_IN)
     rms = float(np.sqrt(np.mean(off(got.profile, t, speed) ** 2)))
-    conformance("run-up from its lines, rms speed error", 0.0, rms, 1e-4, "1", "analytic")
+    conformance("run-up from its lines, rms speed error", 0.0, rms, 1e-4, "1", PUT_IN)
     assert np.median(got.profile.confidence) > 0.95
     assert got.rival_probability > 1e-12  # lines may always be something else's: no reading is beyond doubt
     assert {"order 23", "order 46", "order 69"} <= {name for name, part in got.heard if part > 0.5}
@@ -67,7 +69,7 @@ def test_a_constant_speed_is_read_too(conformance):
     speed = np.full(t.size, 12.3)
     got = speed_from_lines("acc", signal(speed), RATE, settings())
     error = float(np.max(np.abs(off(got.profile, t, speed))))
-    conformance("constant speed from its lines, largest error", 0.0, error, 1e-3, "1", "analytic")
+    conformance("constant speed from its lines, largest error", 0.0, error, 1e-3, "1", PUT_IN)
     assert got.profile.doubtful and "stand still in Hz" in got.profile.notes[0]
 
 
@@ -304,7 +306,7 @@ def test_a_real_run_up_without_its_speed_channel(conformance):
     known = RidgeSettings(orders, 10.0, 100.0, 8.0, "crank")  # 600 to 6000 rpm, 8 turns/s²: stated for any car
     got = speed_from_lines("microphone", x[:, :1].T, rate, known)
     error = off(got.profile, np.arange(crank.size) / rate, crank)
-    source = "the recording's own speed channel"
+    source = "recording: Ansys, accel_with_rpm.wav, its own speed channel"
     conformance("car run-up without its speed channel, rms", 0.0, float(np.sqrt(np.mean(error**2))), 0.006, "1", source)
     conformance("car run-up without its speed channel, largest", 0.0, float(np.abs(error).max()), 0.02, "1", source)
     assert got.profile.times_s[0] < 2.0 and got.profile.times_s[-1] > 19.0

@@ -58,7 +58,7 @@ def test_a_tone_of_known_audibility(frequency, conformance):
         tone.audibility_db,
         0.5,
         "dB",
-        "analytic: sine in noise that is white when A-weighted; formulas (12) to (14)",
+        "known input: sine in noise that is white when A-weighted; ISO/PAS 20065:2016, formulas (12) to (14)",
     )
     level = 10.0 * math.log10(DENSITY * width_hz(frequency) / 20e-6**2) + 8.0
     assert tone.level_db == pytest.approx(level, abs=0.4)
@@ -76,7 +76,7 @@ def test_two_tones_of_one_band_add_up_above_1_khz_and_stay_two_below(conformance
         near.mean_db,
         0.5,
         "dB",
-        "analytic: two sines, formula (17)",
+        "known input: two sines; ISO/PAS 20065:2016, formula (17)",
     )
     (apart,) = rated(whitened([(400.0, 6.0), (440.0, 6.0)], seconds=20.0))
     assert all(len(tones.tones) == 2 and not tones.groups for tones in apart.spectra)

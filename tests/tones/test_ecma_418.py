@@ -21,7 +21,7 @@ from tdacoustic.tones.critical_bands import (
 )
 from tdacoustic.tones.ecma_418 import _LOWER_EDGE, _UPPER_EDGE, _polynomial, prominence_criterion_db, ratio_criterion_db
 
-SOURCE = "ECMA-418-1:2024 (phonometry)"
+SOURCE = "standard: ECMA-418-1:2024, as quoted by the program phonometry"
 RATE = 25600.0
 
 
@@ -92,7 +92,7 @@ def test_a_tone_of_known_ratio(frequency, ratio_db, conformance):
     # tone is 80 dB over the noise of a line, and the skirts of the window count as noise.
     tolerance = {6.0: 0.4, 20.0: 0.25, 60.0: 0.8}[ratio_db]
     what = f"tone-to-noise ratio of {ratio_db:g} dB at {frequency:g} Hz"
-    conformance(what, ratio_db, tone.tone_to_noise_db, tolerance, "dB", "analytic: sine in white noise")
+    conformance(what, ratio_db, tone.tone_to_noise_db, tolerance, "dB", "known input: sine in white noise")
     expected = 10.0 * math.log10(1.0 + 10.0 ** (0.1 * ratio_db))  # the bands beside hold the same noise...
     low, high = arithmetic_or_geometric_band(frequency)
     below = 100.0 if frequency <= 171.4 else low - _polynomial(_LOWER_EDGE, frequency)
@@ -105,7 +105,7 @@ def test_a_tone_of_known_ratio(frequency, ratio_db, conformance):
         tone.prominence_db,
         leak,
         "dB",
-        "analytic: sine in white noise",
+        "known input: sine in white noise, bands beside by the fits of ECMA-418-1:2024, tables 2 and 3",
     )
     assert tone.tone_to_noise_prominent is bool(tone.tone_to_noise_db >= ratio_criterion_db(tone.frequency_hz))
     level = 10.0 * math.log10(DENSITY * width_hz(frequency) * 10.0 ** (0.1 * ratio_db) / 20e-6**2)

@@ -15,10 +15,10 @@ from tdacoustic.tones.masking import (
     tone_level_db,
 )
 
-E1 = "ISO/PAS 20065:2016, table E.1 (phonometry)"
-E2 = "ISO/PAS 20065:2016, table E.2 (phonometry)"
-E3 = "ISO/PAS 20065:2016, table E.3 (phonometry)"
-I10 = "DIN 45681:2005, tables I.9 and I.10 (phonometry)"
+E1 = "standard: ISO/PAS 20065:2016, table E.1, as quoted by the program phonometry"
+E2 = "standard: ISO/PAS 20065:2016, table E.2, as quoted by the program phonometry"
+E3 = "standard: ISO/PAS 20065:2016, table E.3, as quoted by the program phonometry"
+I10 = "standard: DIN 45681:2005, tables I.9 and I.10, as quoted by the program phonometry"
 ROUNDED = 0.005 + 1e-9
 """Printed to 0.01 dB."""
 CHAIN = 0.03
@@ -109,12 +109,12 @@ def test_the_tone_adjustment():
 
 @pytest.mark.parametrize("row", printed.BANDWIDTHS_HZ, ids=lambda row: f"{row[0]} Hz")
 def test_critical_bandwidths(row, conformance):
-    source = "DIN 45681:2005, table A.1 (phonometry)"
+    source = "standard: DIN 45681:2005, table A.1, as quoted by the program phonometry"
     tolerance = 0.5 if row[0] < 13500 else 1.2  # whole numbers, but for the last, which is 1.1 Hz off the formula
     conformance(f"critical bandwidth at {row[0]} Hz", row[1], critical_bandwidth_hz(row[0]), tolerance, "Hz", source)
 
 
 def test_separation_of_two_tones(conformance):
-    source = "DIN 45681:2005, annex J (phonometry)"
+    source = "standard: DIN 45681:2005, annex J, as quoted by the program phonometry"
     conformance("separation of two tones at 212 Hz", 21.0, separation_hz(212.0), 1e-9, "Hz", source)
     conformance("separation of two tones at 137 Hz", 24.09, separation_hz(137.0), 0.06, "Hz", source)

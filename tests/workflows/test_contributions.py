@@ -63,7 +63,14 @@ def test_known_contributions_come_back_in_bands(found, made, conformance):
         for row in known.itertuples()
     ]
     error = np.abs(known["level_db"].to_numpy() - true)
-    conformance("contributions of bands, 95 % of the errors", 0.0, float(np.percentile(error, 95)), 1.0, "dB", "drive")
+    conformance(
+        "contributions of bands, 95 % of the errors",
+        0.0,
+        float(np.percentile(error, 95)),
+        1.0,
+        "dB",
+        "known input: simulated drive of known contributions",
+    )
     assert error.max() < 3.0
     inside = (known["low_db"] <= true) & (true <= known["high_db"])
     assert inside.mean() > 0.85

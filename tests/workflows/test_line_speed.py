@@ -199,7 +199,7 @@ def test_keys_that_are_wrong_are_refused(tmp_path, text, run, match):
 # ---------------------------------------------------------------- what is found
 
 
-def test_a_run_up_without_a_tacho_is_read_as_the_tacho_would_say(tmp_path, conformance):
+def test_a_run_up_without_a_tacho_is_read_as_the_tacho_would_say(tmp_path):
     """The synthetic first run of recordings/, its tacho left out; its own synthesis made the lines."""
     shutil.copytree(FIRST_RUN, tmp_path / "first")
     path = tmp_path / "first" / "campaign.toml"
@@ -211,8 +211,7 @@ def test_a_run_up_without_a_tacho_is_read_as_the_tacho_would_say(tmp_path, confo
     path.write_text(with_tacho, encoding="utf-8")
     rows = {(row["run"], row["source"]): row for row in speeds(analysed(path))}
     for run in ("30", "50", "run-up"):
-        off = rows[run, "lines"]["beside_leading"]
-        conformance(f"first run, {run}: lines beside the tacho, mean", 0.0, off, 1e-3, "1", "the recording's tacho")
+        assert abs(rows[run, "lines"]["beside_leading"]) <= 1e-3
     cut = text.index('[[channel]]\nname = "tacho"')
     path.write_text(text[:cut] + text[text.index("[[run]]") :], encoding="utf-8")
     analysis = analysed(path)
@@ -314,7 +313,7 @@ def test_slip_is_told_where_train_and_motor_are_known(tmp_path, conformance):
     analysis = analysed(path)
     (row,) = analysis.tables["slip"].to_dict("records")
     assert (row["train_channel"], row["shaft_channel"], row["shaft"]) == ("gps", "tacho", "motor")
-    conformance("usual slip", 0.01, row["usual_slip"], 5e-4, "1", "analytic")
+    conformance("usual slip", 0.01, row["usual_slip"], 5e-4, "1", "known input: wheel and train of known slip")
     assert row["n_events"] == 1 and row["worst_event"] == "slip"
     assert (row["worst_slip"], row["worst_from_s"], row["worst_to_s"]) == pytest.approx((0.05, 6.0, 8.0), abs=0.1)
     assert row["reason"] is None or row["reason"] != row["reason"]
@@ -381,6 +380,6 @@ def test_the_real_run_up_through_the_analysis(tmp_path, conformance):
     profiles = found["beside"].runs[0].measurement.speed.profiles
     crank, lines = profiles
     off = lines.speed / crank.speed_at(lines.times_s) - 1.0
-    source = "the recording's own speed channel"
+    source = "recording: Ansys, accel_with_rpm.wav, its own speed channel"
     conformance("car run-up through the analysis, rms", 0.0, float(np.sqrt(np.mean(off**2))), 0.006, "1", source)
     assert row["mean"] == pytest.approx(60.0 * lines.mean)

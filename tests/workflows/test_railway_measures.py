@@ -58,7 +58,7 @@ def test_the_levels_of_known_passages(passages, conformance):
             (row,) = rows(passages, run=name, channel=channel, standard="ISO 3095:2013").to_dict("records")
             assert (row["test"], row["symbol"]) == ("pass-by", "LpAeq,Tp")
             assert (row["start_s"], row["end_s"]) == pytest.approx((FRONT_S, REAR_S))
-            source = "analytic: incoherent sources along a moving line"
+            source = "known input: incoherent sources along a moving line"
             # Intervals of 10 ms at both ends, the filter at 1 kHz.
             what = f"LpAeq,Tp of run {name}, {channel}, by the command"
             conformance(what, pass_by_level_db(rms), row["level_db"], 0.03, "dB", source)
@@ -203,7 +203,7 @@ def test_the_unit_by_length(tmp_path, conformance):
     found = analysed(folder / "campaign.toml")
     (unit,) = rows(found, symbol="LpAeq,T,unit").to_dict("records")
     energy = (10.0 * 0.1**2 + 30.0 * 0.2**2) / 40.0
-    source = "ISO 3095:2013, 5.7, formulas (1) and (2) (phonometry)"
+    source = "standard: ISO 3095:2013, 5.7, formulas (1) and (2), as quoted by the program phonometry"
     level = 10.0 * math.log10(energy / 20e-6**2)
     conformance(
         "level of a standing unit of two positions, by the command", level, unit["level_db"], 0.02, "dB", source

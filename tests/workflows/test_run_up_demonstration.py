@@ -10,7 +10,7 @@ import pytest
 from tdacoustic.workflows.analyze import analyze
 
 FOLDER = Path(__file__).parents[2] / "recordings" / "run-up"
-SOURCE = "recipe and truth.json of recordings/run-up"
+SOURCE = "known input: recipe and truth.json of recordings/run-up"
 
 
 @pytest.fixture(scope="module")

@@ -189,7 +189,12 @@ def everything_campaign(root):
     (folder / "runs.csv").write_text(
         f"condition,logs,train_speed_km_h\na,a.h5,30\na,missing.h5,30\na,damaged.h5,30\na,../atfx/{log.name},30\n"
     )
-    head = HEAD.replace("\n\n", '\nfleet = "../fleet.toml"\nruns = "runs.csv"\nsensors = "sensors.csv"\n\n', 1)
+    named = 'fleet = "../fleet.toml"\nruns = "runs.csv"\nsensors = "sensors.csv"\ntemplate = "../house"\n'
+    head = HEAD.replace("\n\n", f"\n{named}\n", 1)
+    house = root / "house"
+    house.mkdir()
+    (house / "template.toml").write_text('schema = "tdacoustic-template/1"\ncompany = "House"\nlogo = "logo.png"\n')
+    (house / "logo.png").write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(64))
     fit = '[calibration]\nwith_campaigns = ["../other"]\nprior_fleet = "../other/fleet.toml"\n'
     (folder / "sensors.csv").write_text("serial,sensitivity,unit\n1,50,mV/Pa\n")
     path.write_text(head.replace('"Small"', '"All"') + MIC + fit, encoding="utf-8")

@@ -1,12 +1,13 @@
-"""Tables with many rows, folded away."""
+"""What does not all stand in sight: tables with many rows, figures of many channels."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
-from tdacoustic.reporting.document import Block, Details, Table
+from tdacoustic.reporting.document import Alternatives, Block, Details, Table
 
-__all__ = ["MOST_ROWS", "in_sight"]
+__all__ = ["MOST_ROWS", "chosen", "in_sight"]
 
 MOST_ROWS: Final = 24
 """Rows of a table that stands in sight: about a page."""
@@ -31,3 +32,17 @@ def in_sight(table: Table, what: str) -> Block:
     'Runs, 40 rows'
     """
     return table if len(table.rows) <= MOST_ROWS else Details(f"{what}, {len(table.rows)} rows", [table])
+
+
+def chosen(label: str, views: Sequence[tuple[str, Sequence[Block]]]) -> list[Block]:
+    """Return views of which the reader chooses one; a single one as it is, nothing of none.
+
+    Parameters
+    ----------
+    label : str
+        What is chosen, ``"Channel"``.
+    views : sequence of (str, sequence of blocks)
+    """
+    if len(views) < 2:
+        return [block for _, blocks in views for block in blocks]
+    return [Alternatives(label, views)]

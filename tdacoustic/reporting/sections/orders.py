@@ -13,7 +13,7 @@ from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Figure
-from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.sections.folding import chosen, in_sight
 from tdacoustic.reporting.sections.order_figures import average_figure, cut_figure, shaft_words
 from tdacoustic.reporting.sections.order_maps import frequency_figure, order_figure
 from tdacoustic.reporting.sections.order_sentences import fixed_sentences, leader_sentences
@@ -97,15 +97,13 @@ def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones:
     origin = analysis.campaign.origin
     drawn = [item for item in channels if item[0].name in open_ones]
     drawn += [item for item in channels if item[0].name not in open_ones][: max(0, most - len(drawn))]
+    views: list[tuple[str, list[Block]]] = []
     for channel, held in drawn:
         figures = [frequency_figure(run.name, found, channel, held), cut_figure(run.name, found, channel, held)]
         if channel.name in open_ones:
             figures.insert(1, order_figure(run.name, found, channel, held))
-        shown = [FigureBlock(figure, origin) for figure in figures if isinstance(figure, Figure)]
-        if channel.name in open_ones:
-            blocks += shown
-        elif shown:
-            blocks.append(Details(f"{channel.name}: map and orders over speed", shown))
+        views.append((channel.name, [FigureBlock(figure, origin) for figure in figures if isinstance(figure, Figure)]))
+    blocks += chosen("Channel", [(name, shown) for name, shown in views if shown])
     left = len(channels) - len(drawn)
     if left > 0:
         blocks.append(Paragraph(f"Maps and orders of {left} more channels are in result.h5 and orders.csv."))

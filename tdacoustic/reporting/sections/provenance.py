@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
+from tdacoustic.reporting.sections.method import method_of_measurement
 from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
 
 __all__ = ["ASSUMPTIONS", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
@@ -22,12 +23,14 @@ ASSUMPTIONS = (
 )
 
 
-def provenance(analysis: Analysis) -> Section:
-    """Return the section on provenance."""
+def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
+    """Return the section on provenance; `behind` are its subsections on single sections of the report."""
     blocks = [
         *inputs_of(analysis.inputs),
         settings_of(analysis.settings),
+        *method_of_measurement(analysis),
         Section("assumptions", "Assumptions", [Sentences(ASSUMPTIONS)]),
+        *behind,
         *steps_of(analysis),
         versions_of(analysis.versions),
     ]

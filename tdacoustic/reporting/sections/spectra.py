@@ -13,6 +13,7 @@ from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Element, Figure, Heatmap, Line, Markers
+from tdacoustic.reporting.sections.folding import chosen
 from tdacoustic.reporting.sections.words import (
     condition_words,
     measured_channels,
@@ -65,15 +66,19 @@ def _run_figures(analysis: Analysis, run: MeasuredRun) -> list[Block]:
     figures: list[Block] = []
     for quantity, members in ordered:
         steady = [member for member in members if member[1].spectrum is not None]
+        groups: list[tuple[str, Sequence[Block]]] = []
         for start in range(0, len(steady), TRACES):
             part = "" if len(steady) <= TRACES else f"-{start // TRACES + 1}"
-            figure = _spectrum_figure(analysis, run, quantity, steady[start : start + TRACES], part)
-            figures.append(FigureBlock(figure, analysis.campaign.origin))
+            some = steady[start : start + TRACES]
+            figure = _spectrum_figure(analysis, run, quantity, some, part)
+            names = ", ".join(channel.name for channel, _ in some)
+            groups.append((names, [FigureBlock(figure, analysis.campaign.origin)]))
+        figures += chosen("Channels", groups)
         drawn = [member for member in members if member[1].map is not None and member[1].map.times_s.size > 1]
-        maps = [FigureBlock(_map_figure(run, *member), analysis.campaign.origin) for member in drawn]
-        figures += maps if quantity == "sound_pressure" else []
-        if maps and quantity != "sound_pressure":
-            figures.append(Details(f"Maps of {len(maps)} {quantity.replace('_', ' ')} channels", maps))
+        figures += chosen(
+            "Channel",
+            [(member[0].name, [FigureBlock(_map_figure(run, *member), analysis.campaign.origin)]) for member in drawn],
+        )
     return figures
 
 

@@ -66,6 +66,73 @@
     });
   }
 
+  /* ---- alternatives: one channel or condition at a time ---- */
+  for (const [number, group] of all(".alternatives").entries()) {
+    const views = [...group.children].filter((one) => one.classList.contains("view"));
+    const chooser = document.createElement("select");
+    chooser.id = `chooser-${number + 1}`;
+    views.forEach((view, at) => chooser.append(new Option(view.dataset.name, at)));
+    const show = () => views.forEach((view, at) => { view.hidden = at !== chooser.selectedIndex; });
+    const bar = document.createElement("p"), label = document.createElement("label");
+    bar.className = "chooser";
+    label.htmlFor = chooser.id;
+    label.textContent = group.dataset.label;
+    bar.append(label, chooser);
+    group.prepend(bar);
+    group.classList.add("chosen");
+    chooser.addEventListener("change", show);
+    group.reveal = (inside) => {
+      const at = views.findIndex((view) => view.contains(inside));
+      if (at >= 0) { chooser.selectedIndex = at; show(); }
+    };
+    show();
+  }
+
+  /* ---- a link to something folded away or not chosen opens it ---- */
+  const reveal = () => {
+    const target = location.hash.length > 1 && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    if (!target) return;
+    for (let node = target; node; node = node.parentElement) {
+      if (node.tagName === "DETAILS") node.open = true;
+      if (node.reveal) node.reveal(target);
+    }
+    target.scrollIntoView();
+  };
+  addEventListener("hashchange", reveal);
+  reveal();
+
+  /* ---- sounds: one at a time; changing between those of one place keeps the place ---- */
+  const players = all(".sound audio");
+  for (const block of all(".sound")) {
+    const own = all("audio", block), strip = block.querySelector(".strip"), cursor = block.querySelector(".cursor");
+    let last = null;
+    const draw = () => {
+      if (!last || !cursor) return;
+      cursor.hidden = false;
+      cursor.style.left = `${(100 * last.currentTime) / (last.duration || 1)}%`;
+      if (!last.paused) requestAnimationFrame(draw);
+    };
+    for (const audio of own) {
+      audio.addEventListener("play", () => {
+        for (const other of players) if (other !== audio) other.pause();
+        if (last && last !== audio && !last.ended) audio.currentTime = last.currentTime;
+        last = audio;
+        audio.closest(".track").classList.add("playing");
+        draw();
+      });
+      audio.addEventListener("pause", () => audio.closest(".track").classList.remove("playing"));
+      audio.addEventListener("seeked", () => {
+        if (!last || last.paused) last = audio;
+        draw();
+      });
+    }
+    if (!strip) continue;
+    strip.addEventListener("click", (event) => {
+      const box = strip.getBoundingClientRect(), audio = last || own[0];
+      audio.currentTime = ((event.clientX - box.left) / box.width) * (audio.duration || 0);
+    });
+  }
+
   /* ---- contents: where the reader is ---- */
   const links = new Map(all("nav.side a").map((link) => [link.getAttribute("href").slice(1), link]));
   if (links.size && "IntersectionObserver" in window) {
@@ -122,7 +189,10 @@
     }
     return node;
   };
-  const painted = (figure, scheme) => coloured(figure.json, palette[scheme]);
+  const painted = (figure, scheme) => {  // plotly writes into the layout that it is given: a copy
+    const { data, layout } = figure.json;
+    return coloured({ data, layout: structuredClone(layout) }, palette[scheme]);
+  };
 
   /* The same greedy placement as layout.py, for the size and the range shown. */
   const measure = document.createElement("canvas").getContext("2d");

@@ -1,0 +1,64 @@
+"""What a reader sees of a cell, a notice and an origin, the same on a page and on paper."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from tdacoustic.reporting.document import Cell, Column, Link
+
+__all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "cell_text", "number_text"]
+
+NOTICE_WORDS: Final = {
+    "info": "Note",
+    "warning": "Warning",
+    "bad": "Problem",
+    "synthetic": "Synthetic",
+    "assumed": "Assumed",
+}
+"""What a notice of each kind begins with."""
+ORIGIN_SENTENCES: Final = {
+    "measured": "The data of this report were measured.",
+    "synthetic": "The data of this report were made by a program. They are not measurements.",
+    "printed": "The data of this report were taken from a publication.",
+    "assumed": "The data of this report are assumptions.",
+    "calculated": "The data of this report were calculated by a model. They are not measurements.",
+    "mixed": "The data of this report are of several origins. Each number says its own.",
+}
+"""What a report of each origin says of itself."""
+
+
+def number_text(value: float, digits: int | None) -> str:
+    """Write a number for reading, with a true minus sign.
+
+    Parameters
+    ----------
+    value : float
+    digits : int or None
+        Decimals; None: six significant digits.
+
+    Examples
+    --------
+    >>> number_text(-3.256, 1), number_text(-0.01, 1)
+    ('−3.3', '0.0')
+    """
+    text = f"{value:.{digits}f}" if digits is not None else f"{value:.6g}"
+    if text.startswith("-") and not text.strip("-0."):
+        text = text[1:]
+    return text.replace("-", "\u2212")
+
+
+def cell_text(column: Column, cell: Cell) -> str:
+    """Write a cell of a table for reading; a number that is not determined is a dash.
+
+    Examples
+    --------
+    >>> cell_text(Column("valid", "Valid"), True), cell_text(Column("level_db", "Level", kind="number"), None)
+    ('yes', '–')
+    """
+    if cell is None:
+        return "\u2013" if column.kind == "number" else ""
+    if isinstance(cell, Link):
+        return cell.text
+    if isinstance(cell, bool):
+        return "yes" if cell else "no"
+    return cell if isinstance(cell, str) else number_text(cell, column.digits)

@@ -1,0 +1,144 @@
+"""The pytest side of the comparisons with outside truths: records rows, writes the pages, holds the committed ones."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import platform
+from pathlib import Path
+
+import pytest
+from conformance_page import COMMAND, page, table_of_a_run
+from conformance_rows import Kept, Row, differences, load, save
+
+# What makes the numbers, and the programs that some are held against.
+PROGRAMS = ("numpy", "scipy", "pandas", "PyOctaveBand", "ngsolve", "lmfit", "emcee", "exudyn", "bempp-cl", "rota-order")
+PROGRAMS += ("librosa", "mpmath", "npTDMS", "asammdf", "pyuff", "soundfile")
+MOST_SAID = 30
+
+
+class Conformance:
+    """Rows of one run, and what became of each test."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        self.config = config
+        self.rows_file = config.rootpath / "tests" / "conformance.json"
+        self.page_file = config.rootpath / "CONFORMANCE.md"
+        self.rows: dict[str, list[Row]] = {}
+        self.outcomes: dict[str, str] = {}
+        self.collected: set[str] = set()
+        self.skipped_files: set[str] = set()
+        self.cut = False
+        self.said: list[str] = []
+        self.written = ""
+
+    def record(self, row: Row) -> None:
+        self.rows.setdefault(row.test, []).append(row)
+
+    # ---- what pytest tells
+
+    def pytest_collectreport(self, report: pytest.CollectReport) -> None:
+        if report.skipped:
+            self.skipped_files.add(report.nodeid)
+
+    def pytest_deselected(self, items: list[pytest.Item]) -> None:
+        self.cut = self.cut or bool(items)
+
+    def pytest_collection_finish(self, session: pytest.Session) -> None:
+        self.collected = {item.nodeid for item in session.items}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        before = self.outcomes.get(report.nodeid, "passed")
+        self.outcomes[report.nodeid] = before if before != "passed" else report.outcome
+
+    def pytest_sessionfinish(self, session: pytest.Session) -> None:
+        target = self.config.getoption("--conformance")
+        if target:
+            _write(Path(target), table_of_a_run([row for test in sorted(self.rows) for row in self.rows[test]]))
+        if self.config.getoption("--conformance-update"):
+            kept = self.updated(load(self.rows_file))
+            save(kept, self.rows_file)
+            _write(self.page_file, page(kept))
+            self.written = (
+                f"CONFORMANCE.md and tests/conformance.json: {len(kept.all())} rows of {len(kept.rows)} tests"
+            )
+        elif self.whole():
+            self.said = self.stale(load(self.rows_file))
+            if self.said and session.exitstatus == pytest.ExitCode.OK:
+                session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        if self.written:
+            terminalreporter.line(self.written)
+        if not self.said:
+            return
+        terminalreporter.section("CONFORMANCE.md is not what this run found", sep="=", red=True)
+        for line in self.said[:MOST_SAID]:
+            terminalreporter.line(line)
+        if len(self.said) > MOST_SAID:
+            terminalreporter.line(f"... and {len(self.said) - MOST_SAID} more")
+        terminalreporter.line(
+            f"Where the change is meant: `{COMMAND}` writes tests/conformance.json and CONFORMANCE.md anew "
+            "(with the paths of some tests: their rows alone); look at the difference and commit both."
+        )
+
+    # ---- what follows
+
+    def whole(self) -> bool:
+        """Return whether this run had the whole suite: every test was wanted, and each has ended."""
+        config = self.config
+        wanted = [(config.invocation_params.dir / argument).resolve() for argument in config.args]
+        left_out = self.cut or any(config.getoption(name, None) for name in ("ignore", "ignore_glob", "lf"))
+        ended = self.collected and self.collected == set(self.outcomes)
+        return wanted == [(config.rootpath / "tests").resolve()] and not left_out and bool(ended)
+
+    def stale(self, kept: Kept) -> list[str]:
+        """Return what of the committed rows is not what this whole run found, a sentence each."""
+        said = []
+        for test in sorted(set(kept.rows) | set(self.rows)):
+            if test not in kept.rows and not kept.whole:
+                continue  # nobody has collected all rows yet
+            if self.outcomes.get(test) == "passed":
+                said += differences(kept.rows.get(test, ()), self.rows.get(test, ()))
+            elif test in kept.rows and self._is_gone(test):
+                said.append(f"{test}: there is no such test any more, but rows of it")
+        return said
+
+    def updated(self, kept: Kept) -> Kept:
+        """Return the rows with those of the tests that passed; rows of tests that did not run here stay."""
+        whole = self.whole()
+        rows = {
+            test: held
+            for test, held in kept.rows.items()
+            if self.outcomes.get(test) != "passed" and not (whole and self._is_gone(test))
+        }
+        for test, found in self.rows.items():
+            if self.outcomes.get(test) == "passed":
+                rows[test] = [row.kept() for row in found]
+        complete = whole and set(self.outcomes.values()) <= {"passed", "skipped"}
+        return Kept(dict(sorted(rows.items())), _versions(), kept.whole or complete)
+
+    def _is_gone(self, test: str) -> bool:
+        """Return whether a test is not there, as opposed to one that could not run here."""
+        file, _, name = test.partition("::")
+        if test in self.outcomes or file in self.skipped_files:
+            return False
+        function = f"{file}::{name.partition('[')[0]}"
+        cases = [other for other in self.outcomes if other.partition("[")[0] == function]
+        return not (cases and all(self.outcomes[other] == "skipped" for other in cases))
+
+
+def _versions() -> dict[str, str]:
+    found = {"Python": platform.python_version()}
+    for name in PROGRAMS:
+        try:
+            found[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    partial = path.with_name(path.name + ".partial")
+    partial.write_text(text, encoding="utf-8")
+    partial.replace(path)
