@@ -1,7 +1,7 @@
 """The page in a real browser: zoom, read-out, choice of channel, sorting, dark, narrow, keyboard, nothing from outside.
 
-Needs the package playwright (extra ``verification``) and a Chromium: its own (``playwright install chromium``) or that of
-the system, which ``CHROMIUM`` may name.
+Needs the package playwright (extra ``verification``) and a Chromium: its own (``playwright install chromium``) or that
+of the system, which ``CHROMIUM`` may name.
 """
 
 import csv
