@@ -64,13 +64,14 @@ class Row:
 
     def kept(self) -> Row:
         """Return the row as it is committed: no digit that the tolerance makes meaningless."""
-        step = self.tolerance or 1e-9 * max(abs(self.expected), 1e-30)
+        tolerance = float(f"{self.tolerance:.4g}")
+        step = tolerance or 1e-9 * max(abs(self.expected), 1e-30)
         return Row(
             self.test,
             self.what,
             to_step(self.expected, 1e-3 * step),
             to_step(self.got, 0.02 * step),
-            float(f"{self.tolerance:.4g}"),
+            tolerance,
             self.unit,
             self.source,
         )
