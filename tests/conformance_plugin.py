@@ -1,10 +1,15 @@
-"""The pytest side of the comparisons with outside truths: records rows, writes the pages, holds the committed ones."""
+"""The pytest side of the comparisons with outside truths: gathers rows, writes the pages, holds the committed ones.
+
+A test's rows travel in its reports, so that they arrive from the worker processes of pytest-xdist as well. One process
+judges and writes: the one that was started. The workers collect, and tell it what they left out.
+"""
 
 from __future__ import annotations
 
 import importlib.metadata
 import platform
 from pathlib import Path
+from typing import Any
 
 import pytest
 from conformance_page import COMMAND, page, table_of_a_run
@@ -16,25 +21,26 @@ PROGRAMS += ("librosa", "mpmath", "npTDMS", "asammdf", "pyuff", "soundfile")
 MOST_SAID = 30
 
 
-class Conformance:
-    """Rows of one run, and what became of each test."""
+PROPERTY = "conformance"  # of a test's report, of what a worker returns, and of this plugin
+
+
+def record(item: pytest.Item, row: Row) -> None:
+    """Give a row of a running test to the reports of it."""
+    item.user_properties.append((PROPERTY, row.values()))
+
+
+def plugin(config: pytest.Config) -> Collecting:
+    """Return the plugin of this process: one that judges, or a worker's."""
+    return Worker(config) if hasattr(config, "workerinput") else Conformance(config)
+
+
+class Collecting:
+    """What a process that collects tests leaves out."""
 
     def __init__(self, config: pytest.Config) -> None:
         self.config = config
-        self.rows_file = config.rootpath / "tests" / "conformance.json"
-        self.page_file = config.rootpath / "CONFORMANCE.md"
-        self.rows: dict[str, list[Row]] = {}
-        self.outcomes: dict[str, str] = {}
-        self.collected: set[str] = set()
         self.skipped_files: set[str] = set()
         self.cut = False
-        self.said: list[str] = []
-        self.written = ""
-
-    def record(self, row: Row) -> None:
-        self.rows.setdefault(row.test, []).append(row)
-
-    # ---- what pytest tells
 
     def pytest_collectreport(self, report: pytest.CollectReport) -> None:
         if report.skipped:
@@ -43,12 +49,50 @@ class Conformance:
     def pytest_deselected(self, items: list[pytest.Item]) -> None:
         self.cut = self.cut or bool(items)
 
+
+class Worker(Collecting):
+    """One of the processes that pytest-xdist shares the tests among."""
+
+    def pytest_sessionfinish(self) -> None:
+        self.config.workeroutput[PROPERTY] = {"cut": self.cut, "skipped_files": sorted(self.skipped_files)}
+
+
+class Conformance(Collecting):
+    """Rows of one run, and what became of each test."""
+
+    def __init__(self, config: pytest.Config) -> None:
+        super().__init__(config)
+        self.rows_file = config.rootpath / "tests" / "conformance.json"
+        self.page_file = config.rootpath / "CONFORMANCE.md"
+        self.rows: dict[str, list[Row]] = {}
+        self.outcomes: dict[str, str] = {}
+        self.collected: set[str] = set()
+        self.said: list[str] = []
+        self.written = ""
+
+    # ---- what pytest tells
+
     def pytest_collection_finish(self, session: pytest.Session) -> None:
-        self.collected = {item.nodeid for item in session.items}
+        self.collected.update(item.nodeid for item in session.items)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_xdist_node_collection_finished(self, ids: list[str]) -> None:
+        self.collected.update(ids)
+
+    @pytest.hookimpl(optionalhook=True)
+    def pytest_testnodedown(self, node: Any) -> None:
+        told = getattr(node, "workeroutput", {}).get(PROPERTY)  # nothing where the worker crashed
+        if told:
+            self.cut = self.cut or told["cut"]
+            self.skipped_files.update(told["skipped_files"])
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         before = self.outcomes.get(report.nodeid, "passed")
         self.outcomes[report.nodeid] = before if before != "passed" else report.outcome
+        # Each report of a test has all rows so far: the last one's hold.
+        rows = [Row(report.nodeid, *values) for name, values in report.user_properties if name == PROPERTY]
+        if rows:
+            self.rows[report.nodeid] = rows
 
     def pytest_sessionfinish(self, session: pytest.Session) -> None:
         target = self.config.getoption("--conformance")

@@ -44,6 +44,10 @@ class Row:
         if not (self.tolerance >= 0.0 and math.isfinite(self.tolerance) and math.isfinite(self.expected)):
             raise ValueError(f"{self.what}: expected {self.expected} ± {self.tolerance} is no statement")
 
+    def values(self) -> list[str | float]:
+        """Return what stands in ``COLUMNS``: ``Row(test, *values)`` is the row again."""
+        return [getattr(self, name) for name in COLUMNS]
+
     @property
     def kind(self) -> str:
         return self.source.partition(": ")[0]
@@ -109,7 +113,7 @@ def save(kept: Kept, path: Path) -> None:
     """Write one row a line, so that a change of a number is a change of one line."""
     tests = []
     for test in sorted(kept.rows):
-        lines = [json.dumps([getattr(row, name) for name in COLUMNS], ensure_ascii=False) for row in kept.rows[test]]
+        lines = [json.dumps(row.values(), ensure_ascii=False) for row in kept.rows[test]]
         tests.append(json.dumps(test, ensure_ascii=False) + ": [\n " + ",\n ".join(lines) + "\n]")
     made_with = json.dumps(dict(kept.made_with), ensure_ascii=False)
     columns = json.dumps(COLUMNS)

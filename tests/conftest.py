@@ -13,7 +13,7 @@ from hypothesis import settings
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))  # for plain_fleets, made_up_modes, studies, conformance_*
 
-from conformance_plugin import Conformance
+import conformance_plugin
 from conformance_rows import Row
 
 # The same examples in every run, so that a run tells of the change and not of the dice; HYPOTHESIS_PROFILE=search
@@ -23,9 +23,6 @@ settings.register_profile("search", max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-
-
-_HELD = pytest.StashKey[Conformance]()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
@@ -38,8 +35,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    config.stash[_HELD] = Conformance(config)
-    config.pluginmanager.register(config.stash[_HELD], "conformance")
+    config.pluginmanager.register(conformance_plugin.plugin(config), conformance_plugin.PROPERTY)
 
 
 @pytest.fixture
@@ -51,7 +47,7 @@ def conformance(request: pytest.FixtureRequest) -> Callable[..., None]:
 
     def compare(what: str, expected: float, got: float, tolerance: float, unit: str, source: str) -> None:
         row = Row(request.node.nodeid, what, float(expected), float(got), float(tolerance), unit, source)
-        request.config.stash[_HELD].record(row)
+        conformance_plugin.record(request.node, row)
         assert row.holds, f"{what}: expected {row.expected:.9g} ± {tolerance:.3g} {unit} ({source}), got {row.got:.9g}"
 
     return compare

@@ -1,5 +1,6 @@
 """The comparisons with outside truths: what is a row, when a committed one is stale, and CONFORMANCE.md itself."""
 
+import importlib.util
 import math
 import re
 import shutil
@@ -164,25 +165,33 @@ def test_two(conformance):
 """
 
 
-@pytest.fixture
-def suite(tmp_path):
+def project(folder, *options):
     """A small project with two rows, committed: ``write(got, skip)`` changes it, ``run(*arguments)`` tests it."""
-    (tmp_path / "tests").mkdir()
+    (folder / "tests").mkdir()
     for name in ("conftest.py", "conformance_rows.py", "conformance_page.py", "conformance_plugin.py"):
-        shutil.copy(TESTS / name, tmp_path / "tests")
-    (tmp_path / "pyproject.toml").write_text('[tool.pytest.ini_options]\ntestpaths = ["tests"]\n', encoding="utf-8")
+        shutil.copy(TESTS / name, folder / "tests")
+    (folder / "pyproject.toml").write_text('[tool.pytest.ini_options]\ntestpaths = ["tests"]\n', encoding="utf-8")
 
     def write(got="0.5", skip="False", name="test_suite.py"):
-        (tmp_path / "tests" / name).write_text(SUITE.format(got=got, skip=skip), encoding="utf-8")
+        (folder / "tests" / name).write_text(SUITE.format(got=got, skip=skip), encoding="utf-8")
 
     def run(*arguments):
         command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "--import-mode=importlib"]
-        done = subprocess.run([*command, *arguments], cwd=tmp_path, capture_output=True, text=True, check=False)
+        command += [*options, *arguments]
+        done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
         return done.returncode, done.stdout
 
     write()
     assert run("--conformance-update")[0] == 0
-    return write, run, tmp_path
+    return write, run, folder
+
+
+TWO = pytest.mark.skipif(importlib.util.find_spec("xdist") is None, reason="pytest-xdist is not installed")
+
+
+@pytest.fixture(params=[(), pytest.param(("-n", "2"), marks=TWO)], ids=["one process", "two processes"])
+def suite(tmp_path, request):
+    return project(tmp_path, *request.param)
 
 
 STALE = "CONFORMANCE.md is not what this run found"
@@ -227,6 +236,31 @@ def test_rows_of_a_test_that_cannot_run_here_stay(suite):
     assert "| third |" in (folder / "CONFORMANCE.md").read_text(encoding="utf-8")
 
 
+ABSENT = """
+from absent import a_program
+
+a_program()
+{tests}
+"""
+
+
+def test_rows_of_files_that_cannot_be_collected_here_stay(suite):
+    """Two files are left out by one and the same line of a third."""
+    _, run, folder = suite
+    tests = folder / "tests"
+    (tests / "absent.py").write_text("def a_program():\n    pass\n", encoding="utf-8")
+    for name, what in (("test_b.py", "fourth"), ("test_c.py", "fifth")):
+        test = f'def test_it(conformance):\n    conformance("{what}", 1, 1, 0, "1", "program: bc")'
+        (tests / name).write_text(ABSENT.format(tests=test), encoding="utf-8")
+    assert run("--conformance-update")[0] == 0
+    assert len(load(tests / "conformance.json").all()) == 4
+    skip = 'import pytest\n\ndef a_program():\n    pytest.skip("not at hand", allow_module_level=True)\n'
+    (tests / "absent.py").write_text(skip, encoding="utf-8")
+    assert run()[0] == 0
+    assert run("--conformance-update")[0] == 0
+    assert len(load(tests / "conformance.json").all()) == 4
+
+
 def test_rows_of_a_test_that_is_gone_are_stale_and_new_ones_missing(suite):
     write, run, folder = suite
     (folder / "tests" / "test_suite.py").unlink()
@@ -248,3 +282,57 @@ def test_rows_collected_in_parts_are_held_and_others_are_not_missed(suite):
     assert run("--conformance-update")[0] == 0
     assert "**Not complete yet**" not in (folder / "CONFORMANCE.md").read_text(encoding="utf-8")
     assert load(folder / "tests" / "conformance.json").whole
+
+
+def test_a_row_that_fails_is_shown_with_those_before_it(suite):
+    write, run, folder = suite
+    write(got='0.5, 0.1, "1", "analytic: 1 / 2")\n    conformance("half again", 0.5, 0.7')
+    assert run("--conformance", "table.md")[0] == 1
+    assert "3 comparisons by 2 tests, 1 of them do not hold" in (folder / "table.md").read_text(encoding="utf-8")
+
+
+# ---------------------------------------------------------------- several processes
+
+WHERE = """
+import os
+import pytest
+
+@pytest.mark.parametrize("case", range(4))
+def test_where(conformance, case):
+    conformance("process", os.getpid(), os.getpid(), 0, "1", "known input: the operating system")
+"""
+
+
+@TWO
+def test_what_two_workers_found_is_what_one_process_finds(tmp_path):
+    write, run, folder = project(tmp_path)
+    files = folder / "tests" / "conformance.json", folder / "CONFORMANCE.md"
+    write(got="0.45")
+    assert run("--conformance-update")[0] == 0
+    alone = [file.read_bytes() for file in files]
+    write()
+    assert run("--conformance-update")[0] == 0
+    assert [file.read_bytes() for file in files] != alone
+    write(got="0.45")
+    assert run("-n", "2", "--conformance-update")[0] == 0
+    assert [file.read_bytes() for file in files] == alone
+
+
+@TWO
+def test_each_worker_tells_the_rows_of_its_tests(tmp_path):
+    _, run, folder = project(tmp_path, "-n", "2")
+    (folder / "tests" / "test_where.py").write_text(WHERE, encoding="utf-8")
+    assert run("tests/test_where.py", "--conformance-update")[0] == 0
+    rows = load(folder / "tests" / "conformance.json").rows
+    pids = [held[0].got for test, held in rows.items() if "test_where" in test]
+    assert len(pids) == 4 and len(set(pids)) == 2
+
+
+@TWO
+def test_rows_of_a_test_that_killed_its_worker_stay(tmp_path):
+    write, run, folder = project(tmp_path, "-n", "2")
+    before = (folder / "tests" / "conformance.json").read_bytes()
+    write(got="__import__('os')._exit(3)")
+    code, said = run("--conformance-update")
+    assert code == 1 and "crashed while running 'tests/test_suite.py::test_one'" in said
+    assert (folder / "tests" / "conformance.json").read_bytes() == before

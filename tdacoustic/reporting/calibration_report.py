@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Column, Document, Facts, Notice, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
 from tdacoustic.reporting.sections.what_if import what_if_section
 from tdacoustic.results import CampaignCalibration
@@ -21,25 +22,25 @@ def calibration_report(result: CampaignCalibration) -> Document:
     campaign = result.campaign
     notices = []
     if campaign.origin == "synthetic":
-        text = "The levels come from signals made by a program. Nothing in this report was measured."
+        text = say("The levels come from signals made by a program. Nothing in this report was measured.")
         notices.append(Notice("synthetic", text))
-    columns = (Column("file", "File"), Column("sha256", "SHA-256"))
+    columns = (Column("file", say("File")), Column("sha256", say("SHA-256")))
     provenance = Section(
         "provenance",
-        "How the numbers came about",
+        say("How the numbers came about"),
         [
-            Table("inputs", "Inputs", columns, [(file.written, file.sha256) for file in result.inputs]),
-            Section("versions", "Versions", [Facts(list(result.versions.items()))]),
+            Table("inputs", say("Inputs"), columns, [(file.written, file.sha256) for file in result.inputs]),
+            Section("versions", say("Versions"), [Facts(list(result.versions.items()))]),
         ],
     )
     asked = None if result.what_if is None else what_if_section(result.what_if, result.calibration.fleet)
     return Document(
         title=campaign.name,
-        subtitle=f"The model of {result.fleet.name}, calibrated to the campaign's levels",
+        subtitle=say("The model of {name}, calibrated to the campaign's levels", name=result.fleet.name),
         origin=campaign.origin,
         summary=calibration_answer(result),
         notices=notices,
         sections=[calibration_section(result), *(() if asked is None else (asked,)), provenance],
-        facts=[("Conditions", ", ".join(campaign.conditions())), ("Fleet", result.fleet.name)],
-        footer=[f"Made with tdacoustic {__version__}.", "Levels re 20 µPa."],
+        facts=[(say("Conditions"), ", ".join(campaign.conditions())), (say("Fleet"), result.fleet.name)],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), say("Levels re 20 µPa.")],
     )

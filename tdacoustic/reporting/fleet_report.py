@@ -5,6 +5,7 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.reporting.document import Document, Fact, Notice
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER
 from tdacoustic.reporting.sections.campaigns_answer import campaigns_answer
 from tdacoustic.reporting.sections.campaigns_dominance import campaigns_dominance
@@ -30,9 +31,20 @@ def fleet_report(gathering: Gathering) -> Document:
     made = len(gathering.of_origin("synthetic"))
     if made:
         held = len(gathering.results)
-        which = "Every campaign here" if made == held else f"{made} of {held} campaigns here"
-        text = f"{which} {'was' if made == 1 or made == held else 'were'} made by a program; nothing in "
-        notices.append(Notice("synthetic", f"{text}{'it' if made == 1 or made == held else 'them'} was measured."))
+        which = (
+            say("Every campaign here") if made == held else say("{made} of {held} campaigns here", made=made, held=held)
+        )
+        text = say(
+            "{which} {value} made by a program; nothing in ",
+            which=which,
+            value="was" if made == 1 or made == held else "were",
+        )
+        notices.append(
+            Notice(
+                "synthetic",
+                say("{text}{value} was measured.", text=text, value="it" if made == 1 or made == held else "them"),
+            )
+        )
     found = [
         campaigns_dominance(gathering),
         campaigns_levels(gathering),
@@ -43,25 +55,31 @@ def fleet_report(gathering: Gathering) -> Document:
         campaigns_sources(gathering),
     ]
     return Document(
-        title="Fleet view",
-        subtitle="Noise and vibration of traction drives: what the results of many campaigns say together",
+        title=say("Fleet view"),
+        subtitle=say("Noise and vibration of traction drives: what the results of many campaigns say together"),
         origin=origins[0] if len(origins) == 1 else "mixed",
         summary=campaigns_answer(gathering),
         notices=notices,
         sections=[section for section in found if section is not None],
         facts=_facts(gathering),
-        footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), *MEASURED_FOOTER],
     )
 
 
 def _facts(gathering: Gathering) -> list[Fact]:
     trains = {result.identity.train for result in gathering.results if result.identity.train}
     years = sorted({result.identity.year for result in gathering.results if result.identity.year is not None})
-    span = "not known" if not years else str(years[0]) if len(years) == 1 else f"{years[0]} to {years[-1]}"
-    counts = [Fact("Campaigns", str(len(gathering.of_origin(origin))), origin) for origin in gathering.origins]
+    span = (
+        say("not known")
+        if not years
+        else str(years[0])
+        if len(years) == 1
+        else say("{years} to {years_2}", years=years[0], years_2=years[-1])
+    )
+    counts = [Fact(say("Campaigns"), str(len(gathering.of_origin(origin))), origin) for origin in gathering.origins]
     return [
         *counts,
-        Fact("Trains", str(len(trains)) if trains else "not known"),
-        Fact("Years", span),
-        Fact("Left out", str(len(gathering.left_out))),
+        Fact(say("Trains"), str(len(trains)) if trains else say("not known")),
+        Fact(say("Years"), span),
+        Fact(say("Left out"), str(len(gathering.left_out))),
     ]

@@ -43,6 +43,7 @@ from tdacoustic.reporting.document import (
     walk,
 )
 from tdacoustic.reporting.figure import Heatmap
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
@@ -93,20 +94,21 @@ def _plotly_script() -> tuple[str, str]:
 
 
 def _script_hash(source: bytes) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(source).digest()).decode('ascii')}'"
+    return say("'sha256-{decode}'", decode=base64.b64encode(hashlib.sha256(source).digest()).decode("ascii"))
 
 
 def _policy(script_hashes: Sequence[str]) -> str:
-    return (
-        f"default-src 'none'; script-src {' '.join(script_hashes)}; style-src 'unsafe-inline'; "
-        "img-src data: blob:; media-src data:; base-uri 'none'; form-action 'none'"
+    return say(
+        "default-src 'none'; script-src {script_hashes}; style-src 'unsafe-inline'; img-src "
+        "data: blob:; media-src data:; base-uri 'none'; form-action 'none'",
+        script_hashes=" ".join(script_hashes),
     )
 
 
 def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     """What a cell shows, and what it sorts and downloads as (``raw``; None: the same)."""
     align = column.align or ("right" if column.kind == "number" else "left")
-    tag = 'th scope="row"' if first and column.kind == "text" else "td"
+    tag = say('th scope="row"') if first and column.kind == "text" else "td"
     view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None, "href": None}
     view["text"] = text = cell_text(column, cell)
     if cell is None:
@@ -202,7 +204,12 @@ class _Views:
             "name": figure.name,
             "title": figure.title.rstrip("."),
             "caption": figure.caption,
-            "alt": f"{figure.title}: {figure.y_axis.caption} over {figure.x_axis.caption}",
+            "alt": say(
+                "{title}: {caption} over {caption_2}",
+                title=figure.title,
+                caption=figure.y_axis.caption,
+                caption_2=figure.x_axis.caption,
+            ),
             "origin": block.origin,
             "png": Markup(packed),
             "width": width,
@@ -278,14 +285,22 @@ class _Views:
 def _house(house: House | None) -> dict[str, Any] | None:
     if house is None or not (house.company or house.lines or house.logo):
         return None
-    logo = f"data:{house.logo_type};base64,{base64.b64encode(house.logo).decode('ascii')}" if house.logo else ""
+    logo = (
+        say(
+            "data:{logo_type};base64,{decode}",
+            logo_type=house.logo_type,
+            decode=base64.b64encode(house.logo).decode("ascii"),
+        )
+        if house.logo
+        else ""
+    )
     return {"company": house.company, "lines": house.lines, "logo": Markup(logo)}
 
 
 def _sections(document: Document, views: _Views) -> list[dict[str, Any]]:
     sections = []
     if document.summary:
-        sections.append(views.section(Section("summary", "Summary", document.summary), 2, ""))
+        sections.append(views.section(Section("summary", say("Summary"), document.summary), 2, ""))
     sections += [views.section(section, 2, str(n)) for n, section in enumerate(document.sections, start=1)]
     return sections
 
@@ -324,17 +339,27 @@ def render_html(
     sections = _sections(document, views)
     if views.full:
         still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
-        text = f"Of the {still} figures of this page the first {views.interactive} can be zoomed; "
-        text += "the others are still pictures, which keeps the page small."
+        text = say(
+            "Of the {still} figures of this page the first {interactive} can be zoomed; ",
+            still=still,
+            interactive=views.interactive,
+        )
+        text += say("the others are still pictures, which keeps the page small.")
         if views.left_out:
-            text += f" The last {views.left_out} are left out; what they show is in result.h5 and the tables."
+            text += say(
+                " The last {left_out} are left out; what they show is in result.h5 and the tables.",
+                left_out=views.left_out,
+            )
         document_notices = (*document.notices, Notice("info", text))
     else:
         document_notices = tuple(document.notices)
     packed, plotly_hash = _plotly_script() if views.interactive else ("", "")
     script = _template("page.js")
     hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]
-    dark = f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {css_variables('dark')} }} }}\n"
+    dark = say(
+        "@media screen and (prefers-color-scheme: dark) {{ :root {{ {css_variables} }} }}\n",
+        css_variables=css_variables("dark"),
+    )
     environment = Environment(autoescape=True, undefined=StrictUndefined)
     page = environment.from_string(_template("page.html.j2"))
     return page.render(
@@ -347,11 +372,18 @@ def render_html(
             "footer": document.footer,
             "house": _house(document.house),
         },
-        origin_words=ORIGIN_SENTENCES[document.origin],
+        origin_words=say(ORIGIN_SENTENCES[document.origin]),
         sections=sections,
         words=NOTICE_WORDS,
         policy=Markup(_policy(hashes)),
-        css=Markup(f":root {{ {css_variables('light')} }}\n{dark}{_template('page.css')}"),
+        css=Markup(
+            say(
+                ":root {{ {css_variables} }}\n{dark}{template}",
+                css_variables=css_variables("light"),
+                dark=dark,
+                template=_template("page.css"),
+            )
+        ),
         js=Markup(script),
         palette=Markup(safe_json({"light": dict(LIGHT), "dark": dict(DARK)})),
         plotly=Markup(packed),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Fact, Notice, Section
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.answer import answer
 from tdacoustic.reporting.sections.clocks import clocks
 from tdacoustic.reporting.sections.contributions import contributions
@@ -40,19 +41,19 @@ def measured_report(analysis: Analysis) -> Document:
     campaign = analysis.campaign
     notices = []
     if campaign.origin == "synthetic":
-        text = "Every number of this report comes from signals made by a program. Nothing in it was measured."
+        text = say("Every number of this report comes from signals made by a program. Nothing in it was measured.")
         notices.append(Notice("synthetic", text))
     sections = measured_sections(analysis)
     behind, lineage = lineage_sections(sections, analysis.records, analysis.inputs)
     return Document(
         title=campaign.name,
-        subtitle="Noise and vibration of a traction drive: what the recordings show",
+        subtitle=say("Noise and vibration of a traction drive: what the recordings show"),
         origin=campaign.origin,
         summary=answer(analysis),
         notices=notices,
         sections=[*sections, provenance(analysis, behind)],
         facts=measured_facts(analysis),
-        footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), *MEASURED_FOOTER],
         lineage=lineage,
     )
 
@@ -67,9 +68,9 @@ def measured_facts(analysis: Analysis) -> list[Fact]:
     campaign = analysis.campaign
     n_runs = sum(run.measurement is not None for run in analysis.runs)
     return [
-        Fact("Conditions", ", ".join(campaign.conditions()) or "none"),
-        Fact("Runs analysed", f"{n_runs} of {len(analysis.runs)}"),
-        Fact("Channels", str(len(campaign.channels))),
+        Fact(say("Conditions"), ", ".join(campaign.conditions()) or "none"),
+        Fact(say("Runs analysed"), say("{n_runs} of {n_runs_2}", n_runs=n_runs, n_runs_2=len(analysis.runs))),
+        Fact(say("Channels"), str(len(campaign.channels))),
     ]
 
 

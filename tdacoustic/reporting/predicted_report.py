@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Section
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.bearing_loads import bearing_loads
 from tdacoustic.reporting.sections.coupling import coupling_section
 from tdacoustic.reporting.sections.design_sweeps import design_sweeps
@@ -46,16 +47,23 @@ def predicted_report(result: FleetPrediction) -> Document:
     speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
     return Document(
         title=result.fleet.name,
-        subtitle="Noise and vibration of a traction drive: what the rapid model gives",
+        subtitle=say("Noise and vibration of a traction drive: what the rapid model gives"),
         origin="calculated",
         summary=gear_answer(result),
         sections=[*predicted_sections(result), gear_method(result)],
         facts=[
-            ("Conditions", ", ".join(state.condition.name for state in prediction.conditions)),
-            ("Train speeds", " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds))))),
-            ("Teeth", " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
+            (say("Conditions"), ", ".join(state.condition.name for state in prediction.conditions)),
+            (
+                say("Train speeds"),
+                " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds)))),
+            ),
+            (say("Teeth"), " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
         ],
-        footer=[f"Made with tdacoustic {__version__}.", "Levels re 20 µPa.", *PREDICTED_FOOTER],
+        footer=[
+            say("Made with tdacoustic {version}.", version=__version__),
+            say("Levels re 20 µPa."),
+            *PREDICTED_FOOTER,
+        ],
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Block, Document, Fact, Notice, Section, Sentences
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER, measured_facts, measured_sections
 from tdacoustic.reporting.predicted_report import PREDICTED_FOOTER, predicted_sections
 from tdacoustic.reporting.sections.calibration import calibration_section
@@ -19,7 +20,7 @@ from tdacoustic.results import CampaignResult
 
 __all__ = ["run_report"]
 
-SYNTHETIC = "The recordings were made by a program. Nothing in this report was measured."
+SYNTHETIC = mark("The recordings were made by a program. Nothing in this report was measured.")
 
 
 def run_report(result: CampaignResult) -> Document:
@@ -30,40 +31,44 @@ def run_report(result: CampaignResult) -> Document:
     result : CampaignResult
     """
     campaign, analysis = result.campaign, result.analysis
-    fleet = [] if analysis.fleet is None else [Fact("Fleet", analysis.fleet.name)]
+    fleet = [] if analysis.fleet is None else [Fact(say("Fleet"), analysis.fleet.name)]
     modelled = result.calibration is not None or result.prediction is not None
     parts = _parts(result)
     behind, lineage = _lineage(result, parts)
     return Document(
         title=campaign.name,
-        subtitle=f"Noise and vibration of a traction drive: {_scope(result)}",
+        subtitle=say("Noise and vibration of a traction drive: {scope}", scope=_scope(result)),
         origin=campaign.origin,
         summary=run_answer(result),
-        notices=[Notice("synthetic", SYNTHETIC)] if campaign.origin == "synthetic" else [],
+        notices=[Notice("synthetic", say(SYNTHETIC))] if campaign.origin == "synthetic" else [],
         sections=[*parts, _provenance(result, behind)],
         facts=[*measured_facts(analysis), *fleet],
-        footer=[f"Made with tdacoustic {__version__}.", *MEASURED_FOOTER, *(PREDICTED_FOOTER if modelled else ())],
+        footer=[
+            say("Made with tdacoustic {version}.", version=__version__),
+            *MEASURED_FOOTER,
+            *(PREDICTED_FOOTER if modelled else ()),
+        ],
         lineage=lineage,
     )
 
 
 def _scope(result: CampaignResult) -> str:
-    parts = ["what the recordings show" if result.campaign.runs else "the levels that are known"]
-    parts += ["the model held against them"] if result.calibration is not None else []
-    parts += ["what it predicts"] if result.prediction is not None else []
+    parts = [say("what the recordings show") if result.campaign.runs else say("the levels that are known")]
+    parts += [say("the model held against them")] if result.calibration is not None else []
+    parts += [say("what it predicts")] if result.prediction is not None else []
     return ", ".join(parts)
 
 
 def _parts(result: CampaignResult) -> list[Section]:
     """The body: a part each for recordings, calibration and prediction."""
-    heading = "What the recordings show" if result.campaign.runs else "The levels that are known"
+    heading = say("What the recordings show") if result.campaign.runs else say("The levels that are known")
     parts = [Section("recordings", heading, measured_sections(result.analysis))]
     if result.calibration is not None:
         held = calibration_section(result.calibration)
-        parts.append(Section(held.id, "The model held against them", held.blocks))
+        parts.append(Section(held.id, say("The model held against them"), held.blocks))
     if result.prediction is not None:
         modelled = [gear_overview(result.prediction), *predicted_sections(result.prediction)]
-        parts.append(Section("prediction", "What the model predicts", modelled))
+        parts.append(Section("prediction", say("What the model predicts"), modelled))
     return parts
 
 
@@ -83,10 +88,10 @@ def _provenance(result: CampaignResult, behind: Sequence[Block]) -> Section:
         *inputs_of(result.inputs),
         settings_of(result.settings),
         *method_of_measurement(result.analysis),
-        Section("assumptions", "Assumptions on the recordings", [Sentences(ASSUMPTIONS)]),
+        Section("assumptions", say("Assumptions on the recordings"), [Sentences(ASSUMPTIONS)]),
         *(method_sections(result.prediction) if result.prediction is not None else ()),
         *behind,
         *steps_of(result),
         versions_of(result.analysis.versions),
     ]
-    return Section("provenance", "How the numbers came about", blocks)
+    return Section("provenance", say("How the numbers came about"), blocks)

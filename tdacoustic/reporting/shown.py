@@ -5,24 +5,25 @@ from __future__ import annotations
 from typing import Final
 
 from tdacoustic.reporting.document import Cell, Column, Link
+from tdacoustic.reporting.language import mark
 
 __all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "cell_text", "number_text"]
 
 NOTICE_WORDS: Final = {
-    "info": "Note",
-    "warning": "Warning",
-    "bad": "Problem",
-    "synthetic": "Synthetic",
-    "assumed": "Assumed",
+    "info": mark("Note"),
+    "warning": mark("Warning"),
+    "bad": mark("Problem"),
+    "synthetic": mark("Synthetic"),
+    "assumed": mark("Assumed"),
 }
 """What a notice of each kind begins with."""
 ORIGIN_SENTENCES: Final = {
-    "measured": "The data of this report were measured.",
-    "synthetic": "The data of this report were made by a program. They are not measurements.",
-    "printed": "The data of this report were taken from a publication.",
-    "assumed": "The data of this report are assumptions.",
-    "calculated": "The data of this report were calculated by a model. They are not measurements.",
-    "mixed": "The data of this report are of several origins. Each number says its own.",
+    "measured": mark("The data of this report were measured."),
+    "synthetic": mark("The data of this report were made by a program. They are not measurements."),
+    "printed": mark("The data of this report were taken from a publication."),
+    "assumed": mark("The data of this report are assumptions."),
+    "calculated": mark("The data of this report were calculated by a model. They are not measurements."),
+    "mixed": mark("The data of this report are of several origins. Each number says its own."),
 }
 """What a report of each origin says of itself."""
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 from reportlab.platypus import CondPageBreak, Flowable, Image, NextPageTemplate, PageBreak, Paragraph
 
 from tdacoustic.reporting.document import Document, House, Notice, Section
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.pdf.fonts import Fonts, prepared
 from tdacoustic.reporting.pdf.pages import ACROSS, LOWEST, UPRIGHT, WIDTHS, Book, Contents
 from tdacoustic.reporting.pdf.story import Piece, Story, section_numbers
@@ -21,11 +22,11 @@ __all__ = ["bound"]
 _LOGO: Final = (150.0, 42.0)
 """The most that a logo is wide and high, in points."""
 _MOST_PASSES: Final = 8
-_NOT_EMBEDDED: Final = (
+_NOT_EMBEDDED: Final = mark(
     "Chinese signs are shown by the program that opens this file, if it has a font for them. "
     "pip install 'tdacoustic[pdf]' installs one that is put into the file."
 )
-_CODED: Final = "A sign that no font of this file has is shown by its code, such as [U+1F600]."
+_CODED: Final = mark("A sign that no font of this file has is shown by its code, such as [U+1F600].")
 
 
 def bound(document: Document) -> bytes:
@@ -39,9 +40,9 @@ def bound(document: Document) -> bytes:
     story = Story(fonts, WIDTHS, section_numbers(document.sections), document.lineage)
     _head(story, document, fonts)
     if document.summary:
-        story.section(Section("summary", "Summary", document.summary), 0)
+        story.section(Section("summary", say("Summary"), document.summary), 0)
     if document.sections:
-        story.pieces.append(Piece(Paragraph(markup("Contents", fonts, bold=True), style("h0")), 40.0, leads=True))
+        story.pieces.append(Piece(Paragraph(markup(say("Contents"), fonts, bold=True), style("h0")), 40.0, leads=True))
         story.pieces.append(Piece(Contents(), 80.0))
     for section in document.sections:
         story.section(section, 0)
@@ -76,14 +77,14 @@ def _head(story: Story, document: Document, fonts: Fonts) -> None:
             story.text(house.company, "fold", bold=True)
         for line in house.lines:
             story.text(line, "small")
-    story.text(ORIGIN_SENTENCES[document.origin], "small")
+    story.text(say(ORIGIN_SENTENCES[document.origin]), "small")
     story.text(document.title, "title", bold=True)
     if document.subtitle:
         story.text(document.subtitle, "subtitle")
     story.facts(document.facts)
     notices = [*document.notices]
-    notices += [] if fonts.embedded else [Notice("info", _NOT_EMBEDDED)]
-    notices += [Notice("info", _CODED)] if fonts.coded else []
+    notices += [] if fonts.embedded else [Notice("info", say(_NOT_EMBEDDED))]
+    notices += [Notice("info", say(_CODED))] if fonts.coded else []
     for notice in notices:
         story.notice(notice)
 
@@ -91,7 +92,7 @@ def _head(story: Story, document: Document, fonts: Fonts) -> None:
 def _logo(house: House) -> list[Flowable]:
     if not house.logo:
         return []
-    picture = Image(io.BytesIO(house.logo), hAlign="LEFT", mask="auto")
+    picture = Image(io.BytesIO(house.logo), hAlign=say("LEFT"), mask="auto")
     picture._restrictSize(*_LOGO)
     return [picture]
 

@@ -17,6 +17,7 @@ from reportlab.platypus.tableofcontents import TableOfContents
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import REGULAR, Fonts, plain
 from tdacoustic.reporting.pdf.text import Anchored, style
@@ -67,16 +68,26 @@ class Contents(TableOfContents):
         """Lay out what the pass before found; nothing in the first."""
         rows = [
             [
-                Paragraph(f'<a href="#{key}">{marked}</a>', style(f"contents-{depth}")),
-                Paragraph(f'<a href="#{key}">{page}</a>', style("page-number")),
+                Paragraph(say('<a href="#{key}">{marked}</a>', key=key, marked=marked), style(f"contents-{depth}")),
+                Paragraph(say('<a href="#{key}">{page}</a>', key=key, page=page), style("page-number")),
             ]
             for depth, marked, page, key in self._lastEntries
         ] or [["", ""]]
         self._table = Grid(rows, colWidths=[availWidth - 30.0, 30.0])
-        above = [("TOPPADDING", (0, at), (-1, at), 5.0) for at, entry in enumerate(self._lastEntries) if not entry[0]]
-        sides = [(f"{side}PADDING", (0, 0), (-1, -1), 0.8) for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")]
+        above = [
+            (say("TOPPADDING"), (0, at), (-1, at), 5.0) for at, entry in enumerate(self._lastEntries) if not entry[0]
+        ]
+        sides = [
+            (say("{side}PADDING", side=side), (0, 0), (-1, -1), 0.8)
+            for side in (say("LEFT"), say("RIGHT"), say("TOP"), say("BOTTOM"))
+        ]
         self._table.setStyle(
-            [("FONTNAME", (0, 0), (-1, -1), REGULAR), *sides, *above, ("VALIGN", (0, 0), (-1, -1), "BOTTOM")]
+            [
+                (say("FONTNAME"), (0, 0), (-1, -1), REGULAR),
+                *sides,
+                *above,
+                (say("VALIGN"), (0, 0), (-1, -1), say("BOTTOM")),
+            ]
         )
         self.width, self.height = self._table.wrapOn(self.canv, availWidth, availHeight)
         return self.width, self.height
@@ -100,8 +111,8 @@ class Book(BaseDocTemplate):
             title=plain(document.title),
             subject=plain(document.subtitle),
             author="",
-            keywords=f"data: {document.origin}",
-            creator=f"tdacoustic {__version__}",
+            keywords=say("data: {origin}", origin=document.origin),
+            creator=say("tdacoustic {version}", version=__version__),
             lang="en",
             invariant=1,
             pageCompression=1,
@@ -111,7 +122,7 @@ class Book(BaseDocTemplate):
         self.count = _PageCount()
         self._fonts = fonts
         self._whose = document.title
-        self._data = f"data: {document.origin}"
+        self._data = say("data: {origin}", origin=document.origin)
         self.addPageTemplates([self._template(UPRIGHT, A4), self._template(ACROSS, landscape(A4))])
 
     def _template(self, name: str, size: tuple[float, float]) -> PageTemplate:
@@ -128,7 +139,7 @@ class Book(BaseDocTemplate):
         _line(canvas, _SIDE, height - 38.0, self._fonts.runs(title))
         _line(canvas, width - _SIDE - right, height - 38.0, self._fonts.runs(self._data, bold=True))
         pages = self.count.printed or "?"
-        number = f"page {book.page} of {pages}"
+        number = say("page {page} of {pages}", page=book.page, pages=pages)
         _line(canvas, width - _SIDE - self._fonts.width(number, 7.5), 30.0, self._fonts.runs(number))
         canvas.setStrokeColor(HexColor(colour("grid")))
         canvas.line(_SIDE, height - 44.0, width - _SIDE, height - 44.0)
@@ -146,7 +157,7 @@ class Book(BaseDocTemplate):
         """Tell the contents of a heading."""
         if isinstance(flowable, Anchored) and flowable.entry is not None and flowable.entry[2]:
             depth, _, marked = flowable.entry
-            self.notify("TOCEntry", (depth, marked, self.page, flowable.anchor))
+            self.notify(say("TOCEntry"), (depth, marked, self.page, flowable.anchor))
 
     def _endBuild(self) -> None:
         super()._endBuild()

@@ -23,6 +23,7 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.document import Paragraph as Words
 from tdacoustic.reporting.figure import ReportError
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.layout import cut_text
 from tdacoustic.reporting.matplotlib_renderer import is_thinned
 from tdacoustic.reporting.palette import colour
@@ -168,11 +169,13 @@ class Story:
 
     def notice(self, notice: Notice) -> None:
         """Add a notice: a bar, the word that says what sort it is, its text."""
-        word = markup(NOTICE_WORDS[notice.kind], self._fonts, bold=True)
+        word = markup(say(NOTICE_WORDS[notice.kind]), self._fonts, bold=True)
         said = Paragraph(f"{word}\u2002{markup(notice.text, self._fonts)}", style("fact"))
         bar = HexColor(colour(_NOTICE_COLOURS.get(notice.kind, "series-7")))
         grid = LeftTable([[said]], colWidths=[self._widths[0]], splitInRow=1, spaceBefore=2.0, spaceAfter=4.0)
-        grid.setStyle([_FONT, ("LINEBEFORE", (0, 0), (0, -1), 2.5, bar), ("LEFTPADDING", (0, 0), (-1, -1), 8.0)])
+        grid.setStyle(
+            [_FONT, (say("LINEBEFORE"), (0, 0), (0, -1), 2.5, bar), (say("LEFTPADDING"), (0, 0), (-1, -1), 8.0)]
+        )
         self._put(grid, 40.0)
 
     def facts(self, facts: Sequence[Any]) -> None:
@@ -185,8 +188,8 @@ class Story:
         widths[1] = 0.92 * self._widths[0] - widths[0]
         grid = LeftTable(rows, colWidths=widths, splitInRow=1, spaceAfter=8.0)
         grid.setStyle(
-            [_FONT, ("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0.0)]
-            + [(f"{side}PADDING", (0, 0), (-1, -1), 1.2) for side in ("TOP", "BOTTOM")]
+            [_FONT, (say("VALIGN"), (0, 0), (-1, -1), say("TOP")), (say("LEFTPADDING"), (0, 0), (-1, -1), 0.0)]
+            + [(say("{side}PADDING", side=side), (0, 0), (-1, -1), 1.2) for side in (say("TOP"), say("BOTTOM"))]
         )
         self._put(grid, 40.0)
 
@@ -205,8 +208,15 @@ class Story:
         """The link to how something came about, as it ends a caption."""
         if self._behind is None:
             return ""
-        where = markup(f"How it came about: {self._numbers.get(self._behind, '')}".rstrip(": "), self._fonts)
-        return f' <a href="#{self._behind}" color="{colour("series-0")}">{where}</a>'
+        where = markup(
+            say("How it came about: {behind}", behind=self._numbers.get(self._behind, "")).rstrip(": "), self._fonts
+        )
+        return say(
+            ' <a href="#{behind}" color="{colour}">{where}</a>',
+            behind=self._behind,
+            colour=colour("series-0"),
+            where=where,
+        )
 
     def _put(self, flowable: Flowable, need: float, across: bool = False) -> None:
         self.pieces.append(Piece(flowable, need, across))
@@ -254,7 +264,9 @@ class Story:
         figure = block.figure
         marked = self._titled(figure.title, block.origin, figure.caption) + self._came_about()
         if is_thinned(figure):
-            marked += muted(markup(" Drawn with fewer points than the data have; every maximum is kept.", self._fonts))
+            marked += muted(
+                markup(say(" Drawn with fewer points than the data have; every maximum is kept."), self._fonts)
+            )
         caption = self._caption("figure", f"fig-{figure.name}", marked, "caption")
         picture = kept_figure(figure, self._fonts)
         beside = min(caption.wrap(self._widths[0], 10_000.0)[1], 80.0) + 10.0
@@ -263,7 +275,7 @@ class Story:
 
     def _sound(self, block: Sound, depth: int) -> None:
         tracks = "; ".join(f"{track.label}: {track.text}" if track.text else track.label for track in block.tracks)
-        heard = f"To be heard in the HTML page: {tracks.rstrip('.')}."
+        heard = say("To be heard in the HTML page: {rstrip}.", rstrip=tracks.rstrip("."))
         marked = self._titled(block.title, block.origin, f"{block.caption} {heard}".strip()) + self._came_about()
         self._put(self._caption("sound", f"sound-{block.name}", marked, "caption"), 30.0)
 
@@ -274,12 +286,22 @@ class Story:
         self._lead(caption)
         for part in parts:
             if part.columns is not None:
-                words = f"Columns {part.columns[0]} to {part.columns[1]} of {len(block.columns)}."
+                words = say(
+                    "Columns {columns} to {columns_2} of {n_columns}.",
+                    columns=part.columns[0],
+                    columns_2=part.columns[1],
+                    n_columns=len(block.columns),
+                )
                 self._lead(Paragraph(markup(words, self._fonts), style("small")))
             self._put(part.flowable, part.start_height, part.across)
         rows = len(block.rows)
         if rows > MOST_ROWS:
-            held = f"The first {MOST_ROWS} of {rows} rows; the HTML page has all and saves them as {block.csv_name}."
+            held = say(
+                "The first {most_rows} of {rows} rows; the HTML page has all and saves them as {csv_name}.",
+                most_rows=MOST_ROWS,
+                rows=rows,
+                csv_name=block.csv_name,
+            )
             self._put(Paragraph(markup(held, self._fonts), style("small")), 0.0, parts[-1].across)
         elif not rows:
-            self._put(Paragraph(markup("No rows.", self._fonts), style("small")), 0.0, parts[-1].across)
+            self._put(Paragraph(markup(say("No rows."), self._fonts), style("small")), 0.0, parts[-1].across)

@@ -9,6 +9,7 @@ from xml.sax.saxutils import escape
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.platypus import Paragraph
 
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import BOLD, REGULAR, Fonts
 
@@ -75,13 +76,15 @@ def markup(text: str, fonts: Fonts, bold: bool = False) -> str:
     parts = []
     for font, part in fonts.runs(text, bold):
         safe = escape(part)
-        parts.append(safe if font == own and not bold else f'<font name="{font}">{safe}</font>')
+        parts.append(
+            safe if font == own and not bold else say('<font name="{font}">{safe}</font>', font=font, safe=safe)
+        )
     return "".join(parts)
 
 
 def muted(marked: str) -> str:
     """Return markup in the colour of what is said beside."""
-    return f'<font color="{_MUTED}">{marked}</font>'
+    return say('<font color="{muted}">{marked}</font>', muted=_MUTED, marked=marked)
 
 
 class Anchored(Paragraph):

@@ -11,6 +11,7 @@ from tdacoustic.drive import GearState
 from tdacoustic.gears import DIRECTIONS, GEARS, SteadyState, sampling_points
 from tdacoustic.reporting.document import Block, Details, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import (
     DIRECTION_SLOTS,
     DIRECTION_SYMBOLS,
@@ -38,20 +39,20 @@ EDGE = 1.3
 SAME = 1e-3
 """Relative difference below which a sampling point is the line at it."""
 
-METHOD = (
+METHOD = mark(
     "A force is what the shaft exerts on its bearings through their springs and dampers, K x + C x'. It is the total "
     "of all bearings of a gear{split}. x lies along the line of centres, y is tangential, z lies along the shafts. "
     "Amplitudes are peak values of a line."
 )
-NOT_SPLIT = ": how it is split between the two bearings of a shaft is not modelled"
-SPLIT = "; only for the housing is it split between the two bearings of a shaft"
-NOTHING_BETWEEN = (
+NOT_SPLIT = mark(": how it is split between the two bearings of a shaft is not modelled")
+SPLIT = mark("; only for the housing is it split between the two bearings of a shaft")
+NOTHING_BETWEEN = mark(
     "The motion repeats with each mesh period, so it has nothing between the mesh harmonics: at the sampling points "
     "there the force is zero, which a logarithmic axis cannot show; crosses at its lower edge mark them. What the "
     "paper reads at its points between the harmonics belongs to its record (length, window, what is left of the "
     "start), not to a motion like this one."
 )
-NOT_REPEATING = (
+NOT_REPEATING = mark(
     "The motion does not repeat. The lines are the mesh harmonics and the strongest others of a record of it; what is "
     "broadband has no line, so a sampling point holds only the part of its band that is in lines."
 )
@@ -61,15 +62,15 @@ def bearing_loads(result: FleetPrediction) -> Section:
     """Return the section on bearing forces."""
     states = by_speed(result.prediction.conditions)
     loaded = [state for state in states if largest_line(state) is not None]
-    split = NOT_SPLIT if result.prediction.housing is None else SPLIT
-    blocks: list[Block] = [Paragraph(METHOD.format(split=split))]
+    split = say(NOT_SPLIT) if result.prediction.housing is None else say(SPLIT)
+    blocks: list[Block] = [Paragraph(say(METHOD).format(split=split))]
     still = [state for state in states if state not in loaded]
     if still:
-        without = "without torque the teeth of the model do not touch, and there is no force"
+        without = say("without torque the teeth of the model do not touch, and there is no force")
         blocks.append(Paragraph(sentence(f"{conditions_words(still)}: {without}")))
     if loaded:
         blocks += [_spectra(result, loaded), loads_over_speed(result, loaded)]
-    return Section("bearing-forces", "Bearing forces", blocks)
+    return Section("bearing-forces", say("Bearing forces"), blocks)
 
 
 def _spectra(result: FleetPrediction, loaded: list[GearState]) -> Section:
@@ -82,8 +83,10 @@ def _spectra(result: FleetPrediction, loaded: list[GearState]) -> Section:
     blocks = _of_condition(result, shown)
     if others:
         rest = [state for state in loaded if state is not shown]
-        blocks.append(Details(sentence(f"spectra of {conditions_words(rest)}").rstrip("."), others))
-    return Section("force-spectra", "Spectra", blocks)
+        blocks.append(
+            Details(sentence(say("spectra of {conditions}", conditions=conditions_words(rest))).rstrip("."), others)
+        )
+    return Section("force-spectra", say("Spectra"), blocks)
 
 
 def _of_condition(result: FleetPrediction, state: GearState) -> list[Block]:
@@ -96,19 +99,27 @@ def _words(state: GearState) -> str:
     largest = largest_line(state)
     assert largest is not None
     gear, direction, force, frequency = largest
-    text = f"the largest line is {newtons(force)} at {hertz(frequency)} ({gear}, {direction}). "
+    text = say(
+        "the largest line is {newtons} at {hertz} ({gear}, {direction}). ",
+        newtons=newtons(force),
+        hertz=hertz(frequency),
+        gear=gear,
+        direction=direction,
+    )
     return text + _between_words(state.steady)
 
 
 def _between_words(steady: SteadyState) -> str:
     if steady.repeats_after == 1:
-        return NOTHING_BETWEEN
+        return say(NOTHING_BETWEEN)
     if steady.repeats_after is None:
-        return NOT_REPEATING
-    return (
-        f"The motion repeats only after {steady.repeats_after} mesh periods, so it has lines at every multiple of "
-        f"{hertz(steady.mesh_hz / steady.repeats_after)}, between the mesh harmonics too, and the sampling points "
-        "there hold them."
+        return say(NOT_REPEATING)
+    return say(
+        "The motion repeats only after {repeats_after} mesh periods, so it has lines at every "
+        "multiple of {hertz}, between the mesh harmonics too, and the sampling points there hold "
+        "them.",
+        repeats_after=steady.repeats_after,
+        hertz=hertz(steady.mesh_hz / steady.repeats_after),
     )
 
 
@@ -127,13 +138,18 @@ def _figure(state: GearState, gear: int, highest_hz: float) -> Figure:
     name = GEARS[gear]
     return Figure(
         slug("spectrum", name, state.condition.name),
-        f"Forces on the bearings of the {name}, {state_words(state)}",
-        f"Lines up to {hertz(highest_hz)}; those {DECADES} decades below the strongest are left out. The sampling "
-        f"points of Fig. 9 are the mesh harmonics ({hertz(state.mesh_hz)}) and three between each two of them, each "
-        "with the energy of the lines around it; a cross marks those that are not a line themselves, at the lower edge "
-        "those without a force.",
-        Axis("Frequency", "Hz", limits=(0.0, 1.02 * highest_hz)),
-        Axis("Force", "N", "log", limits=(bottom, 3.0 * top), note="peak amplitude"),
+        say("Forces on the bearings of the {name}, {state}", name=name, state=state_words(state)),
+        say(
+            "Lines up to {hertz}; those {decades} decades below the strongest are left out. The "
+            "sampling points of Fig. 9 are the mesh harmonics ({hertz_2}) and three between each two "
+            "of them, each with the energy of the lines around it; a cross marks those that are not "
+            "a line themselves, at the lower edge those without a force.",
+            hertz=hertz(highest_hz),
+            decades=DECADES,
+            hertz_2=hertz(state.mesh_hz),
+        ),
+        Axis(say("Frequency"), "Hz", limits=(0.0, 1.02 * highest_hz)),
+        Axis(say("Force"), "N", "log", limits=(bottom, 3.0 * top), note=say("peak amplitude")),
         elements,
         height=380,
     )
@@ -155,14 +171,14 @@ def _sampled(state: GearState, gear: int, highest_hz: float, bottom: float) -> l
     found = []
     if empty.any():
         edge = np.full(int(empty.sum()), EDGE * bottom)
-        found.append(Markers(points[empty], edge, "sampled: zero", symbol="x", color=7))
+        found.append(Markers(points[empty], edge, say("sampled: zero"), symbol="x", color=7))
     lines = state.forces.frequency_hz
     nearest = np.abs(lines[None, :] - points[:, None]).argmin(axis=1)
     alone = np.abs(lines[nearest] / points - 1.0) < SAME
     alone = alone & np.isclose(values, np.abs(state.forces.amplitude_n[gear][:, nearest]), rtol=SAME)
     gathered = np.where(alone | (values < bottom), np.nan, values)
     if np.isfinite(gathered).any():
-        texts = [f"direction {direction}" for direction in DIRECTIONS for _ in points]
+        texts = [say("direction {direction}", direction=direction) for direction in DIRECTIONS for _ in points]
         x = np.tile(points, len(DIRECTIONS))
         found.append(Markers(x, gathered.ravel(), "sampled", texts=texts, symbol="x", color=3))
     return found

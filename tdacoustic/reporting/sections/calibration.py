@@ -16,6 +16,7 @@ from tdacoustic.reporting.document import (
     Sentences,
     Table,
 )
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.calibration_figures import (
     contributions_figure,
     levels_figure,
@@ -54,7 +55,7 @@ def calibration_answer(result: CampaignCalibration) -> list[Block]:
     left = [item.error_db for item in found.left_out if item.error_db is not None]
     if left:
         rms = math.sqrt(sum(error**2 for error in left) / len(left))
-        sentences.append(f"Each condition predicted from the others alone is off by {rms:.1f} dB rms.")
+        sentences.append(say("Each condition predicted from the others alone is off by {rms:.1f} dB rms.", rms=rms))
     sentences += _next_words(found)
     return [Sentences(sentences), *(Notice("warning", _sentence(doubt)) for doubt in found.doubts)]
 
@@ -71,15 +72,25 @@ def _value_words(parameter: FittedParameter, fleet: Fleet) -> str:
 
 def _of_parameter(parameter: FittedParameter, fleet: Fleet) -> str:
     key = parameter.key
-    text = f"{keyed_words(key, fleet)} is {quantity_of(key, parameter.value)} (it was {parameter.initial:.4g})"
+    text = say(
+        "{keyed} is {quantity_of} (it was {initial:.4g})",
+        keyed=keyed_words(key, fleet),
+        quantity_of=quantity_of(key, parameter.value),
+        initial=parameter.initial,
+    )
     if parameter.expression is not None:
-        return f"{text}, by {parameter.expression}."
+        return say("{text}, by {expression}.", text=text, expression=parameter.expression)
     if parameter.ci95 is None:
-        return f"{text}; the data give no interval."
+        return say("{text}; the data give no interval.", text=text)
     if parameter.ci95 == (None, None):
-        return f"{text}; its 95 % interval reaches from bound to bound, {parameter.low:g} to {parameter.high:g}."
+        return say(
+            "{text}; its 95 % interval reaches from bound to bound, {low:g} to {high:g}.",
+            text=text,
+            low=parameter.low,
+            high=parameter.high,
+        )
     low, high = ("open" if end is None else f"{end:.4g}" for end in parameter.ci95)
-    return f"{text}; 95 % interval {low} to {high}."
+    return say("{text}; 95 % interval {low} to {high}.", text=text, low=low, high=high)
 
 
 def _rms(errors: list[float]) -> float:
@@ -91,12 +102,19 @@ def _misfit_words(result: CampaignCalibration) -> str:
     before = _rms([level.before_db - level.datum.level_db for level in found.levels])
     after = [level.error_db for level in found.levels]
     worst = max(found.levels, key=lambda level: abs(level.error_db))
-    text = (
-        f"The levels are off by {before:.1f} dB rms before and by {_rms(after):.1f} dB rms after the calibration, at "
-        f"most by {abs(worst.error_db):.1f} dB (condition {worst.datum.condition.name})"
+    text = say(
+        "The levels are off by {before:.1f} dB rms before and by {rms:.1f} dB rms after the "
+        "calibration, at most by {error_db:.1f} dB (condition {name})",
+        before=before,
+        rms=_rms(after),
+        error_db=abs(worst.error_db),
+        name=worst.datum.condition.name,
     )
     if _beside_the_paper(result):
-        text += f"; the paper states a largest error of {LARGEST_ERROR_DB:g} dB of its model"
+        text += say(
+            "; the paper states a largest error of {largest_error_db:g} dB of its model",
+            largest_error_db=LARGEST_ERROR_DB,
+        )
     return f"{text}."
 
 
@@ -110,12 +128,17 @@ def _next_words(found: Calibration) -> list[str]:
         return []
     best = found.next_measurements[0]
     if best.mean_remaining > HARDLY_SHORTER:
-        return ["No single further level is expected to shorten the intervals by more than some per cent."]
+        return [say("No single further level is expected to shorten the intervals by more than some per cent.")]
     parts = [f"{key_words(name, found.fleet)} {100.0 * part:.0f} %" for name, part in best.remaining.items()]
     return [
-        f"What would tell most next is a level at {best.condition.train_speed_km_h:.3g} km/h and "
-        f"{best.condition.torque_n_m:.4g} N m, {best.receiver.name}: of the intervals it would leave "
-        f"{', '.join(parts)}."
+        say(
+            "What would tell most next is a level at {train_speed_km_h:.3g} km/h and "
+            "{torque_n_m:.4g} N m, {name}: of the intervals it would leave {parts}.",
+            train_speed_km_h=best.condition.train_speed_km_h,
+            torque_n_m=best.condition.torque_n_m,
+            name=best.receiver.name,
+            parts=", ".join(parts),
+        )
     ]
 
 
@@ -128,31 +151,40 @@ def calibration_section(result: CampaignCalibration) -> Section:
     figures = [levels_figure(result), contributions_figure(result), residuals_figure(result)]
     blocks += [FigureBlock(figure, None) for figure in figures if figure is not None]
     levels = levels_table(result)
-    blocks.append(Details("Levels and model by condition", [levels]) if len(levels.rows) > MANY_LEVELS else levels)
-    blocks.append(Details("Where the levels and their standard deviations come from", [sources_table(result)]))
-    blocks.append(Details("Contributions at each receiver, before and after", [contributions_table(found)]))
-    blocks.append(Section("calibration-told", "What the data tell", _told(found)))
-    return Section("calibration", "Calibration", blocks)
+    blocks.append(Details(say("Levels and model by condition"), [levels]) if len(levels.rows) > MANY_LEVELS else levels)
+    blocks.append(Details(say("Where the levels and their standard deviations come from"), [sources_table(result)]))
+    blocks.append(Details(say("Contributions at each receiver, before and after"), [contributions_table(found)]))
+    blocks.append(Section("calibration-told", say("What the data tell"), _told(found)))
+    return Section("calibration", say("Calibration"), blocks)
 
 
 def _method_words(found: Calibration) -> str:
     scatter = (
-        f"{found.model_sigma_db:.2g} dB, taken from the misfit"
+        say("{model_sigma_db:.2g} dB, taken from the misfit", model_sigma_db=found.model_sigma_db)
         if found.model_sigma_is_fitted
-        else f"{found.model_sigma_db:g} dB, by [calibration] model_sigma_db"
+        else say("{model_sigma_db:g} dB, by [calibration] model_sigma_db", model_sigma_db=found.model_sigma_db)
     )
-    loss = "" if found.settings.loss == "linear" else f" with the robust loss {found.settings.loss}"
+    loss = "" if found.settings.loss == "linear" else say(" with the robust loss {loss}", loss=found.settings.loss)
     interpolated = (
         ""
         if found.interpolated_db is None
-        else " The search went over levels interpolated between computed ones (largest difference at checked places "
-        f"{found.interpolated_db:.2g} dB); the levels after it are computed."
+        else say(
+            " The search went over levels interpolated between computed ones (largest "
+            "difference at checked places {interpolated_db:.2g} dB); the levels after it are "
+            "computed.",
+            interpolated_db=found.interpolated_db,
+        )
     )
-    return (
-        f"The levels are fitted by weighted least squares{loss} from {found.settings.starts} starts (lmfit). A datum's "
-        f"standard deviation is that of the measurement and of the model together ({scatter}): the model's is what its "
-        "lines on unknown modes scatter by, and the receivers of a condition share it. Intervals are by profile "
-        f"likelihood; an end that a bound comes before is left open.{interpolated}"
+    return say(
+        "The levels are fitted by weighted least squares{loss} from {starts} starts (lmfit). A "
+        "datum's standard deviation is that of the measurement and of the model together "
+        "({scatter}): the model's is what its lines on unknown modes scatter by, and the "
+        "receivers of a condition share it. Intervals are by profile likelihood; an end that a "
+        "bound comes before is left open.{interpolated}",
+        loss=loss,
+        starts=found.settings.starts,
+        scatter=scatter,
+        interpolated=interpolated,
     )
 
 
@@ -160,20 +192,33 @@ def _printed_words(result: CampaignCalibration) -> str:
     """Our level beside each one that the paper prints of its own model; empty of another drive."""
     ours = {item.condition: item.after_db for item in result.over_speed}
     parts = [
-        f"{ours[row.conditions[0]]:.1f} against {row.level_db:g} dB in condition {row.conditions[0]}"
+        say(
+            "{ours:.1f} against {level_db:g} dB in condition {conditions}",
+            ours=ours[row.conditions[0]],
+            level_db=row.level_db,
+            conditions=row.conditions[0],
+        )
         for row in MODEL_4M
         if len(row.conditions) == 1 and not math.isnan(ours.get(row.conditions[0], math.nan))
     ]
     if not _beside_the_paper(result) or not parts:
         return ""
     open_row = next(row for row in MODEL_4M if len(row.conditions) > 1)
-    text = f"The calibrated model beside the paper's own, as printed with its Fig. 16: {', '.join(parts)}"
-    text += f"; {open_row.level_db:g} dB is printed of condition {' or '.join(open_row.conditions)}."
+    text = say(
+        "The calibrated model beside the paper's own, as printed with its Fig. 16: {parts}", parts=", ".join(parts)
+    )
+    text += say(
+        "; {level_db:g} dB is printed of condition {conditions}.",
+        level_db=open_row.level_db,
+        conditions=" or ".join(open_row.conditions),
+    )
     fast = [ours.get(name, math.nan) for name in ("5", "6")]
     if fast[1] >= fast[0]:
-        text += (
-            f" The paper's level falls from condition 5 to 6; the calibrated model has {fast[0]:.1f} and {fast[1]:.1f} "
-            "dB there."
+        text += say(
+            " The paper's level falls from condition 5 to 6; the calibrated model has {fast:.1f} "
+            "and {fast_2:.1f} dB there.",
+            fast=fast[0],
+            fast_2=fast[1],
         )
     return text
 
@@ -181,16 +226,28 @@ def _printed_words(result: CampaignCalibration) -> str:
 def _told(found: Calibration) -> list[Block]:
     number = found.condition_number
     seen = (
-        f"The levels see {found.rank} of {len(found.moved)} directions among the parameters"
-        + ("" if number is None else f" (condition number of the Jacobian, columns of length one: {number:.3g})")
-        + f". Chi square is {found.chi_square:.3g} with {found.degrees_of_freedom} degrees of freedom."
+        say(
+            "The levels see {rank} of {n_moved} directions among the parameters",
+            rank=found.rank,
+            n_moved=len(found.moved),
+        )
+        + (
+            ""
+            if number is None
+            else say(" (condition number of the Jacobian, columns of length one: {number:.3g})", number=number)
+        )
+        + say(
+            ". Chi square is {chi_square:.3g} with {degrees_of_freedom} degrees of freedom.",
+            chi_square=found.chi_square,
+            degrees_of_freedom=found.degrees_of_freedom,
+        )
     )
     blocks: list[Block] = [Paragraph(seen)]
     tables: list[Table | None] = [correlation_table(found), transfer_table(found), posterior_table(found)]
     blocks += [table for table in tables if table is not None]
     following = next_measurement_table(found)
     if following is not None:
-        text = (
+        text = say(
             "To first order, one more level at a speed, torque and receiver would leave this part of each interval; of "
             "a parameter that the data do not determine the bounds are taken as what is known."
         )

@@ -11,6 +11,7 @@ import numpy as np
 from tdacoustic.drive import DriveSound
 from tdacoustic.fitting.calibration import FittedLevel
 from tdacoustic.reporting.figure import Axis, Band, Figure, Line, LineStyle, Markers, Symbol
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.printed import (
     LARGEST_ERROR_DB,
     MEASURED_4M,
@@ -53,29 +54,37 @@ def levels_figure(result: CampaignCalibration) -> Figure | None:
         after = np.array([item.after_db for item in result.over_speed])
         speeds = np.array([item.train_speed_km_h for item in result.over_speed])
         sigma = found.model_sigma_db
-        elements.append(Band(speeds, after - sigma, after + sigma, f"calibrated model ± {sigma:.2g} dB (1 σ)", 2))
+        elements.append(
+            Band(speeds, after - sigma, after + sigma, say("calibrated model ± {sigma:.2g} dB (1 σ)", sigma=sigma), 2)
+        )
     if result.over_speed:
         speeds = np.array([item.train_speed_km_h for item in result.over_speed])
         before = np.array([item.before_db for item in result.over_speed])
         after = np.array([item.after_db for item in result.over_speed])
-        name = "model before: assumed parameters"
+        name = say("model before: assumed parameters")
         elements.append(Line(speeds, before, name, color=7, style="dotted", points=True))
-        elements.append(Line(speeds, after, "model after: calibrated", color=2, points=True))
+        elements.append(Line(speeds, after, say("model after: calibrated"), color=2, points=True))
     for slot, origin in enumerate(dict.fromkeys(level.datum.origin for level in held)):
         of_origin = [level for level in held if level.datum.origin == origin]
-        elements.append(_levels(of_origin, f"level, {origin} (± 1 σ)", SYMBOLS.get(origin, "circle"), slot))
+        elements.append(
+            _levels(of_origin, say("level, {origin} (± 1 σ)", origin=origin), SYMBOLS.get(origin, "circle"), slot)
+        )
     if is_of_the_paper(result.fleet) and result.campaign.origin != "measured":
         elements += _of_paper(result)
     if not elements:
         return None
     return Figure(
         "calibration-over-speed",
-        f"Levels at {result.fleet.radiation.sphere_radius_m.value:g} m over the train's speed, and the model before "
-        "and after the calibration",
-        "One dot a condition; the lines between them only lead the eye. Conditions without a level are the model's "
-        "alone.",
-        Axis("Train speed", "km/h"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        say(
+            "Levels at {value:g} m over the train's speed, and the model before and after the calibration",
+            value=result.fleet.radiation.sphere_radius_m.value,
+        ),
+        say(
+            "One dot a condition; the lines between them only lead the eye. Conditions without a level are the model's "
+            "alone."
+        ),
+        Axis(say("Train speed"), "km/h"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         elements,
         height=480,
     )
@@ -86,7 +95,10 @@ def _levels(held: list[FittedLevel], name: str, symbol: Symbol, slot: int) -> Ma
         np.array([level.datum.condition.train_speed_km_h for level in held]),
         np.array([level.datum.level_db for level in held]),
         name,
-        texts=[f"condition {level.datum.condition.name}, {level.datum.receiver.name}" for level in held],
+        texts=[
+            say("condition {name}, {name_2}", name=level.datum.condition.name, name_2=level.datum.receiver.name)
+            for level in held
+        ],
         symbol=symbol,
         errors=np.array([level.datum.sigma_db for level in held]),
         color=slot,
@@ -107,8 +119,11 @@ def _of_paper(result: CampaignCalibration) -> list[Markers]:
             Markers(
                 np.array([speed for speed, _ in model]),
                 np.array([row.level_db for _, row in model]),
-                f"the paper's model, printed, ± its largest error of {LARGEST_ERROR_DB:g} dB",
-                texts=[f"condition {' or '.join(row.conditions)}" for _, row in model],
+                say(
+                    "the paper's model, printed, ± its largest error of {largest_error_db:g} dB",
+                    largest_error_db=LARGEST_ERROR_DB,
+                ),
+                texts=[say("condition {conditions}", conditions=" or ".join(row.conditions)) for _, row in model],
                 symbol="triangle",
                 errors=np.full(len(model), LARGEST_ERROR_DB),
                 color=3,
@@ -122,8 +137,8 @@ def _of_paper(result: CampaignCalibration) -> list[Markers]:
             Markers(
                 np.array([speed for speed, _ in measured]),
                 np.array([row.level_db for _, row in measured]),
-                "the paper's measurement, printed",
-                texts=[f"condition {row.conditions[0]}" for _, row in measured],
+                say("the paper's measurement, printed"),
+                texts=[say("condition {conditions}", conditions=row.conditions[0]) for _, row in measured],
                 symbol="x",
                 color=1,
             )
@@ -154,11 +169,14 @@ def contributions_figure(result: CampaignCalibration) -> Figure | None:
         return None
     return Figure(
         "calibration-contributions",
-        f"What {joined([path.name for path in dict.fromkeys(drawn)])} contribute at {receiver}, before and after the "
-        "calibration",
-        f"Unweighted levels of each path alone. {total_words(result.fleet, dict.fromkeys(drawn))}",
-        Axis("Train speed", "km/h"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        say(
+            "What {name} contribute at {receiver}, before and after the calibration",
+            name=joined([path.name for path in dict.fromkeys(drawn)]),
+            receiver=receiver,
+        ),
+        say("Unweighted levels of each path alone. {total}", total=total_words(result.fleet, dict.fromkeys(drawn))),
+        Axis(say("Train speed"), "km/h"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         elements,
     )
 
@@ -187,16 +205,16 @@ def residuals_figure(result: CampaignCalibration) -> Figure | None:
             Markers(
                 places,
                 np.array([level.error_db for level in of]),
-                f"condition {condition}",
+                say("condition {condition}", condition=condition),
                 texts=[f"{level.datum.what}, {level.datum.condition.name}" for level in of],
                 color=slot % 7,
             )
         )
     return Figure(
         "calibration-residuals",
-        "Calibrated model less level, by band or order",
-        "At the centre of each band.",
-        Axis("Frequency", "Hz", scale="log"),
-        Axis("Model less level", "dB"),
+        say("Calibrated model less level, by band or order"),
+        say("At the centre of each band."),
+        Axis(say("Frequency"), "Hz", scale="log"),
+        Axis(say("Model less level"), "dB"),
         elements,
     )

@@ -6,6 +6,7 @@ from typing import Final
 
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.parameters import key_words
 from tdacoustic.reporting.sections.sound_paths import heard_paths
 from tdacoustic.reporting.sections.words import pretty_signs
@@ -31,26 +32,26 @@ MOST_ROWS: Final = 8
 def parameters_table(found: Calibration) -> Table:
     """Return the fitted values with their intervals, bounds and priors."""
     columns = (
-        Column("words", "Parameter"),
-        Column("unit", "Unit"),
-        Column("initial", "Before", kind="number"),
-        Column("value", "After", kind="number"),
+        Column("words", say("Parameter")),
+        Column("unit", say("Unit")),
+        Column("initial", say("Before"), kind="number"),
+        Column("value", say("After"), kind="number"),
         Column("stderr", "±", "1 σ", kind="number"),
-        Column("low", "95 % from", kind="number"),
-        Column("high", "95 % to", kind="number"),
-        Column("bounds", "Bounds"),
-        Column("prior", "Prior or expression"),
-        Column("parameter", "Key"),
+        Column("low", say("95 % from"), kind="number"),
+        Column("high", say("95 % to"), kind="number"),
+        Column("bounds", say("Bounds")),
+        Column("prior", say("Prior or expression")),
+        Column("parameter", say("Key")),
     )
     rows: list[list[Cell]] = []
     for p in found.parameters:
         low, high = (None, None) if p.ci95 is None else p.ci95
         before = p.expression or ("none" if p.prior is None else f"{p.prior[0]:.4g} ± {p.prior[1]:.3g}")
-        bounds, before = (pretty_signs(text) for text in (f"{p.low:g} to {p.high:g}", before))
+        bounds, before = (pretty_signs(text) for text in (say("{low:g} to {high:g}", low=p.low, high=p.high), before))
         unit = unit_of(p.key) if "." in p.key else ""
         words = key_words(p.key, found.fleet)
         rows.append([words, unit, p.initial, p.value, p.stderr, low, high, bounds, before, p.key])
-    return Table("calibrated-parameters", "Fitted parameters", columns, rows, origin="calculated")
+    return Table("calibrated-parameters", say("Fitted parameters"), columns, rows, origin="calculated")
 
 
 def levels_table(result: CampaignCalibration) -> Table:
@@ -58,18 +59,18 @@ def levels_table(result: CampaignCalibration) -> Table:
     found = result.calibration
     left = {item.condition: item for item in found.left_out}
     columns = (
-        Column("condition", "Condition"),
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("what", "Level"),
-        Column("receiver", "At"),
-        Column("origin", "Standing", kind="origin"),
-        Column("measured_db", "Held against", "dB", 1, "number"),
-        Column("before_db", "Model before", "dB", 1, "number"),
-        Column("predicted_db", "Model after", "dB", 1, "number"),
-        Column("error_db", "After less level", "dB", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("train_speed_km_h", say("Speed"), "km/h", 1, "number"),
+        Column("what", say("Level")),
+        Column("receiver", say("At")),
+        Column("origin", say("Standing"), kind="origin"),
+        Column("measured_db", say("Held against"), "dB", 1, "number"),
+        Column("before_db", say("Model before"), "dB", 1, "number"),
+        Column("predicted_db", say("Model after"), "dB", 1, "number"),
+        Column("error_db", say("After less level"), "dB", 1, "number"),
         Column("sigma_db", "σ", "dB", 1, "number"),
-        Column("left_out_db", "Condition left out", "model less level, dB", 1, "number"),
-        Column("left_out_sigma_db", "its σ", "dB", 1, "number"),
+        Column("left_out_db", say("Condition left out"), say("model less level, dB"), 1, "number"),
+        Column("left_out_sigma_db", say("its σ"), "dB", 1, "number"),
     )
     rows: list[list[Cell]] = []
     for level in found.levels:
@@ -78,7 +79,7 @@ def levels_table(result: CampaignCalibration) -> Table:
             [
                 datum.condition.name,
                 datum.condition.train_speed_km_h,
-                datum.what if datum.weighting == "Z" else f"{datum.what}, A-weighted",
+                datum.what if datum.weighting == "Z" else say("{what}, A-weighted", what=datum.what),
                 datum.receiver.name,
                 datum.origin,
                 datum.level_db,
@@ -90,31 +91,31 @@ def levels_table(result: CampaignCalibration) -> Table:
                 None if others is None else others.sigma_db,
             ]
         )
-    return Table("calibration-levels", "Levels and model by condition", columns, rows)
+    return Table("calibration-levels", say("Levels and model by condition"), columns, rows)
 
 
 def sources_table(result: CampaignCalibration) -> Table:
     """Return where each datum and its standard deviation come from."""
     columns = (
-        Column("condition", "Condition"),
-        Column("what", "Level"),
-        Column("receiver", "At"),
-        Column("sigma_db", "Its own σ", "dB", 2, "number"),
-        Column("source", "From"),
+        Column("condition", say("Condition")),
+        Column("what", say("Level")),
+        Column("receiver", say("At")),
+        Column("sigma_db", say("Its own σ"), "dB", 2, "number"),
+        Column("source", say("From")),
     )
     data = [level.datum for level in result.calibration.levels]
     rows: list[list[Cell]] = [[d.condition.name, d.what, d.receiver.name, d.sigma_db, d.source] for d in data]
-    return Table("calibration-level-sources", "Where the levels come from", columns, rows)
+    return Table("calibration-level-sources", say("Where the levels come from"), columns, rows)
 
 
 def contributions_table(found: Calibration) -> Table:
     """Return the level of each path at each receiver, before and after; of the structure where it has one."""
     heard = [path.key for path in heard_paths((*found.before, *found.after))]
-    titles = {"motor": "Motor", "mesh": "Meshing", "structure": "Structure", "total": "Total"}
+    titles = {"motor": say("Motor"), "mesh": say("Meshing"), "structure": say("Structure"), "total": say("Total")}
     titles = {path: title for path, title in titles.items() if path != "structure" or path in heard}
     columns = (
-        Column("condition", "Condition"),
-        Column("receiver", "At"),
+        Column("condition", say("Condition")),
+        Column("receiver", say("At")),
         *(
             Column(f"{path}_{side}_db", f"{title} {side}", "dB", 1, "number")
             for path, title in titles.items()
@@ -126,7 +127,7 @@ def contributions_table(found: Calibration) -> Table:
         for receiver in dict.fromkeys(level.receiver for level in before.levels):
             levels = [sound.level_db(receiver, path) for path in titles for sound in (before, after)]
             rows.append([before.condition, receiver, *levels])
-    return Table("calibration-contributions-table", "Contributions", columns, rows, origin="calculated")
+    return Table("calibration-contributions-table", say("Contributions"), columns, rows, origin="calculated")
 
 
 def correlation_table(found: Calibration) -> Table | None:
@@ -135,11 +136,11 @@ def correlation_table(found: Calibration) -> Table | None:
     if found.correlation is None or len(names) < 2:
         return None
     columns = (
-        Column("parameter", "Parameter"),
+        Column("parameter", say("Parameter")),
         *(Column(f"with_{i}", name, digits=3, kind="number") for i, name in enumerate(names, 1)),
     )
     rows: list[list[Cell]] = [[name, *map(float, row)] for name, row in zip(names, found.correlation, strict=True)]
-    return Table("calibration-correlation", "Correlation of the parameters", columns, rows, origin="calculated")
+    return Table("calibration-correlation", say("Correlation of the parameters"), columns, rows, origin="calculated")
 
 
 def next_measurement_table(found: Calibration) -> Table | None:
@@ -149,11 +150,11 @@ def next_measurement_table(found: Calibration) -> Table | None:
         return None
     names = list(held[0].remaining)
     columns = (
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("torque_n_m", "Torque", "N m", 0, "number"),
-        Column("receiver", "At"),
-        Column("expected_db", "Expected", "dB", 1, "number"),
-        *(Column(f"remaining_{i}", name, "interval left, %", 0, "number") for i, name in enumerate(names, 1)),
+        Column("train_speed_km_h", say("Speed"), "km/h", 1, "number"),
+        Column("torque_n_m", say("Torque"), "N m", 0, "number"),
+        Column("receiver", say("At")),
+        Column("expected_db", say("Expected"), "dB", 1, "number"),
+        *(Column(f"remaining_{i}", name, say("interval left, %"), 0, "number") for i, name in enumerate(names, 1)),
     )
     rows: list[list[Cell]] = [
         [
@@ -166,7 +167,7 @@ def next_measurement_table(found: Calibration) -> Table | None:
         for item in held
     ]
     return Table(
-        "next-measurements", "What one more level would do to the intervals", columns, rows, origin="calculated"
+        "next-measurements", say("What one more level would do to the intervals"), columns, rows, origin="calculated"
     )
 
 
@@ -175,20 +176,22 @@ def posterior_table(found: Calibration) -> Table | None:
     if found.posterior is None:
         return None
     columns = (
-        Column("parameter", "Parameter"),
-        Column("median", "Median", kind="number"),
-        Column("low", "95 % from", kind="number"),
-        Column("high", "95 % to", kind="number"),
-        Column("autocorrelation", "Autocorrelation", "steps", 1, "number"),
-        Column("effective_samples", "Effective samples", digits=0, kind="number"),
-        Column("r_hat", "R-hat", digits=3, kind="number"),
+        Column("parameter", say("Parameter")),
+        Column("median", say("Median"), kind="number"),
+        Column("low", say("95 % from"), kind="number"),
+        Column("high", say("95 % to"), kind="number"),
+        Column("autocorrelation", say("Autocorrelation"), "steps", 1, "number"),
+        Column("effective_samples", say("Effective samples"), digits=0, kind="number"),
+        Column("r_hat", say("R-hat"), digits=3, kind="number"),
     )
     rows: list[list[Cell]] = [
         [p.key, p.median, *p.ci95, p.autocorrelation, p.effective_samples, p.r_hat] for p in found.posterior.parameters
     ]
-    caption = (
-        f"Posterior: {found.posterior.walkers} walkers, {found.posterior.steps} steps each, "
-        f"{100.0 * found.posterior.acceptance:.0f} % of the proposals taken"
+    caption = say(
+        "Posterior: {walkers} walkers, {steps} steps each, {acceptance:.0f} % of the proposals taken",
+        walkers=found.posterior.walkers,
+        steps=found.posterior.steps,
+        acceptance=100.0 * found.posterior.acceptance,
     )
     return Table("calibration-posterior", caption, columns, rows, origin="calculated")
 
@@ -198,15 +201,15 @@ def transfer_table(found: Calibration) -> Table | None:
     if not found.transferred:
         return None
     columns = (
-        Column("parameter", "Parameter"),
-        Column("earlier", "Earlier fleet", kind="number"),
+        Column("parameter", say("Parameter")),
+        Column("earlier", say("Earlier fleet"), kind="number"),
         Column("earlier_stderr", "±", "1 σ", kind="number"),
-        Column("prior_sigma", "Prior here", "1 σ", kind="number"),
-        Column("alone", "These data alone", kind="number"),
+        Column("prior_sigma", say("Prior here"), "1 σ", kind="number"),
+        Column("alone", say("These data alone"), kind="number"),
         Column("alone_stderr", "±", "1 σ", kind="number"),
-        Column("difference", "Apart", "σ", 1, "number"),
-        Column("together", "Together", kind="number"),
-        Column("origin", "Where from"),
+        Column("difference", say("Apart"), "σ", 1, "number"),
+        Column("together", say("Together"), kind="number"),
+        Column("origin", say("Where from")),
     )
     values = {parameter.key: parameter.value for parameter in found.parameters}
     rows: list[list[Cell]] = [
@@ -223,4 +226,4 @@ def transfer_table(found: Calibration) -> Table | None:
         ]
         for t in found.transferred
     ]
-    return Table("calibration-transfer", "The earlier fleet and this one", columns, rows, origin="calculated")
+    return Table("calibration-transfer", say("The earlier fleet and this one"), columns, rows, origin="calculated")

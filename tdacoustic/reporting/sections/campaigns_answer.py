@@ -11,6 +11,7 @@ from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.speed_bands import SpeedBand
 from tdacoustic.gathering.verdicts import Tally, tallies
 from tdacoustic.reporting.document import Block, Notice, Paragraph, Sentences
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.campaigns_dominance import matrix_width
 from tdacoustic.reporting.sections.campaigns_outliers import outlier_words
 from tdacoustic.reporting.sections.campaigns_quality import bad_words
@@ -31,16 +32,21 @@ def campaigns_answer(gathering: Gathering) -> list[Block]:
         said.append(quality)
     blocks: list[Block] = [Sentences(said)]
     if gathering.links:
-        words = (
+        words = say(
             "In the tables, a name leads to the campaign's own report; where a row is of several, to the newest one's."
         )
         blocks.append(Paragraph(words))
     if gathering.left_out:
         count = len(gathering.left_out)
         first = gathering.left_out[0]
-        text = f"{plural(count, 'folder')} left out, among them {first.folder}: {first.reason}."
+        text = say(
+            "{plural} left out, among them {folder}: {reason}.",
+            plural=plural(count, "folder"),
+            folder=first.folder,
+            reason=first.reason,
+        )
         if count == 1:
-            text = f"One folder is left out: {first.folder}: {first.reason}."
+            text = say("One folder is left out: {folder}: {reason}.", folder=first.folder, reason=first.reason)
         blocks.append(Notice("warning", text))
     return blocks
 
@@ -51,17 +57,17 @@ def how_many(gathering: Gathering) -> str:
     for origin in gathering.origins:
         results = gathering.of_origin(origin)
         if results:
-            parts.append(plural(len(results), f"{origin} campaign"))
+            parts.append(plural(len(results), say("{origin} campaign", origin=origin)))
     trains = {result.identity.train for result in gathering.results if result.identity.train}
     years = sorted({result.identity.year for result in gathering.results if result.identity.year is not None})
     fleets = {result.fleet for result in gathering.results if result.fleet}
     said = joined(parts)
     if trains:
-        said += f" of {plural(len(trains), 'train')}"
+        said += say(" of {plural}", plural=plural(len(trains), "train"))
     if fleets:
         said += f", {plural(len(fleets), 'fleet')}"
     if years:
-        said += f", {years[0]}" if len(years) == 1 else f", {years[0]} to {years[-1]}"
+        said += f", {years[0]}" if len(years) == 1 else say(", {years} to {years_2}", years=years[0], years_2=years[-1])
     return f"{said}."
 
 
@@ -76,15 +82,26 @@ def _dominance(gathering: Gathering, origin: Origin) -> str:
             counts[word] = counts.get(word, 0) + count
     named = sorted((item for item in counts.items() if item[0] != "undecided"), key=lambda item: -item[1])
     total = sum(counts.values())
-    parts = [f"the {word} in {count}" for word, count in named]
+    parts = [say("the {word} in {count}", word=word, count=count) for word, count in named]
     undecided = counts.get("undecided", 0)
     if not parts:
-        return f"None of {plural(total, f'{origin} condition')} has a named source: all are undecided."
-    said = f"Most of the noise lines' energy is of {joined(parts)} of {plural(total, f'{origin} condition')}"
+        return say(
+            "None of {plural} has a named source: all are undecided.",
+            plural=plural(total, say("{origin} condition", origin=origin)),
+        )
+    said = say(
+        "Most of the noise lines' energy is of {parts} of {plural}",
+        parts=joined(parts),
+        plural=plural(total, say("{origin} condition", origin=origin)),
+    )
     said += (
-        f" with a verdict; {undecided} {'is' if undecided == 1 else 'are'} undecided."
+        say(
+            " with a verdict; {undecided} {value} undecided.",
+            undecided=undecided,
+            value="is" if undecided == 1 else "are",
+        )
         if undecided
-        else " with a verdict."
+        else say(" with a verdict.")
     )
     return f"{said}{_over_speed(found)}"
 
@@ -95,10 +112,17 @@ def _over_speed(found: Mapping[SpeedBand, Tally]) -> str:
     for majority, bands in itertools.groupby(found.items(), key=lambda item: item[1].majority):
         held = [band for band, _ in bands]
         if majority:
-            parts.append(f"the {majority} from {held[0].low:g} to {held[-1].high:g} km/h")
+            parts.append(
+                say(
+                    "the {majority} from {low:g} to {high:g} km/h",
+                    majority=majority,
+                    low=held[0].low,
+                    high=held[-1].high,
+                )
+            )
     if len(found) < 2 or not parts:
         return ""
-    return f" More than half of the verdicts name {joined(parts)}."
+    return say(" More than half of the verdicts name {parts}.", parts=joined(parts))
 
 
 def _levels(gathering: Gathering, origin: Origin) -> str:
@@ -107,8 +131,21 @@ def _levels(gathering: Gathering, origin: Origin) -> str:
         return ""
     low, high = (pick(points, key=lambda point: point.level_db) for pick in (min, max))
     if len(points) == 1:
-        return f"The one {origin} level at 4 m is {high.level_db:.1f} dB re 20 µPa at {high.speed_km_h:.0f} km/h."
-    return (
-        f"The {len(points)} {origin} levels at 4 m go from {low.level_db:.1f} dB re 20 µPa ({low.result.train}, "
-        f"{low.speed_km_h:.0f} km/h) to {high.level_db:.1f} dB ({high.result.train}, {high.speed_km_h:.0f} km/h)."
+        return say(
+            "The one {origin} level at 4 m is {level_db:.1f} dB re 20 µPa at {speed_km_h:.0f} km/h.",
+            origin=origin,
+            level_db=high.level_db,
+            speed_km_h=high.speed_km_h,
+        )
+    return say(
+        "The {n_points} {origin} levels at 4 m go from {level_db:.1f} dB re 20 µPa ({train}, "
+        "{speed_km_h:.0f} km/h) to {level_db_2:.1f} dB ({train_2}, {speed_km_h_2:.0f} km/h).",
+        n_points=len(points),
+        origin=origin,
+        level_db=low.level_db,
+        train=low.result.train,
+        speed_km_h=low.speed_km_h,
+        level_db_2=high.level_db,
+        train_2=high.result.train,
+        speed_km_h_2=high.speed_km_h,
     )

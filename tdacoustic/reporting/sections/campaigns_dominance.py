@@ -12,6 +12,7 @@ from tdacoustic.gathering.speed_bands import SpeedBand, band_width
 from tdacoustic.gathering.verdicts import Matrix, Row, Tally, has_verdict, tallies, verdict_rows
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, shown_of
 from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, probability_words
 
@@ -23,7 +24,7 @@ MOST_BANDS: Final = 10
 _FEW: Final = 8
 """Verdicts up to which each whole number stands on the axis."""
 
-_EXPLAINED: Final = (
+_EXPLAINED: Final = mark(
     "A cell is the verdict of the campaigns' own analyses: the source that has most of the sound energy in the noise "
     "lines, with the probability that it has (of several conditions the smallest, and in brackets how many there are). "
     "Where verdicts differ, each is counted; undecided is what stays below a probability of 0.9. An empty "
@@ -53,13 +54,13 @@ def tally_words(tally: Tally | None) -> str | None:
         return None
     if len(tally.words) > 1:
         counts = ", ".join(f"{word} {count}" for word, count in tally.words)
-        return counts if tally.majority else f"mixed: {counts}"
+        return counts if tally.majority else say("mixed: {counts}", counts=counts)
     word, count = tally.words[0]
     if word == "undecided":
         if count > 1:
-            return f"undecided ({count})"
+            return say("undecided ({count})", count=count)
         leads = f": {tally.leading} {_sure(tally)}" if tally.leading else ""
-        return f"undecided{leads}"
+        return say("undecided{leads}", leads=leads)
     return f"{word} {_sure(tally)}{f' ({count})' if count > 1 else ''}".replace("  ", " ").strip()
 
 
@@ -76,13 +77,13 @@ def campaigns_dominance(gathering: Gathering) -> Section | None:
     rows = verdict_rows(gathering.results, width)
     if not rows:
         return None
-    blocks: list[Block] = [Paragraph(_EXPLAINED)]
+    blocks: list[Block] = [Paragraph(say(_EXPLAINED))]
     for origin in gathering.origins:
         figure = _figure(gathering, origin, width)
         if figure is not None:
             blocks.append(figure)
     blocks.append(_matrix(gathering, rows))
-    return Section("dominance", "Dominant source over speed", blocks)
+    return Section("dominance", say("Dominant source over speed"), blocks)
 
 
 def _matrix(gathering: Gathering, rows: Matrix) -> Table:
@@ -90,9 +91,9 @@ def _matrix(gathering: Gathering, rows: Matrix) -> Table:
     order = list(gathering.origins)
     names: list[Row] = sorted(rows, key=lambda row: (order.index(row.origin), row.fleet, not row.is_train))
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("origin", "Origin", kind="origin"),
-        Column("fleet", "Fleet"),
+        Column("train", say("Train, else campaign")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("fleet", say("Fleet")),
         *(Column(f"band_{band.low:.16g}_km_h", band.words, "km/h", kind="source") for band in bands),
     ]
     cells: list[list[Cell]] = []
@@ -101,7 +102,7 @@ def _matrix(gathering: Gathering, rows: Matrix) -> Table:
         verdicts = [tally_words(tally.get(band)) for band in bands]
         cells.append([name_cell(gathering, results), row.origin, row.fleet or None, *verdicts])
     left_out = shown_of(len(cells), len(names), "rows", "overview")
-    caption = f"Dominant source with its probability.{left_out}"
+    caption = say("Dominant source with its probability.{left_out}", left_out=left_out)
     return Table("dominance-matrix", caption.rstrip("."), columns, cells)
 
 
@@ -125,17 +126,21 @@ def _figure(gathering: Gathering, origin: Origin, width: float) -> FigureBlock |
     ]
     if others:
         values = np.array([float(sum(held.get(word, 0) for word in others)) for held in counts.values()])
-        name = others[0] if len(others) == 1 else "another component"
+        name = others[0] if len(others) == 1 else say("another component")
         bars.append(Bars([band.words for band in found], values, name, color=OWNER_SLOT_OTHER))
     n = sum(tally.n for tally in found.values())
     most = max(tally.n for tally in found.values())
     return FigureBlock(
         Figure(
             f"dominance-{origin}",
-            f"Verdicts by speed, {origin}",
-            f"{plural(n, 'verdict')} of {plural(len(results), f'{origin} campaign')}, one a condition.",
-            Axis("Train speed", "km/h"),
-            Axis("Verdicts", names=[str(count) for count in range(most + 1)] if most <= _FEW else ()),
+            say("Verdicts by speed, {origin}", origin=origin),
+            say(
+                "{plural} of {plural_2}, one a condition.",
+                plural=plural(n, "verdict"),
+                plural_2=plural(len(results), say("{origin} campaign", origin=origin)),
+            ),
+            Axis(say("Train speed"), "km/h"),
+            Axis(say("Verdicts"), names=[str(count) for count in range(most + 1)] if most <= _FEW else ()),
             bars,
             height=320,
             bar_mode="stack",

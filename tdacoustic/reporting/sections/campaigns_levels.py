@@ -15,6 +15,7 @@ from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.speed_bands import SpeedBand, band_at, band_width
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Band, Figure, Line, Markers, Symbol
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.campaigns_rows import (
     MOST_POINTS,
     MOST_ROWS,
@@ -35,7 +36,7 @@ MOST_BANDS: Final = 10
 OVER_YEARS: Final = 4
 GREY: Final = 7
 
-_EXPLAINED: Final = (
+_EXPLAINED: Final = mark(
     "The unweighted level at 4 m of a condition is the energy mean over its runs and over the microphones within 5 % "
     "of 4 m, corrected for background where background was recorded; channels that are bad do not enter. Levels that a "
     "campaign states instead of recording them are drawn as crosses. A level of a result without distances of its "
@@ -50,10 +51,10 @@ def campaigns_levels(gathering: Gathering) -> Section | None:
     held = [(origin, points) for origin, points in found if points]
     if not held:
         return None
-    blocks: list[Block] = [Paragraph(_EXPLAINED)]
+    blocks: list[Block] = [Paragraph(say(_EXPLAINED))]
     for origin, points in held:
         blocks += [_over_speed(origin, points), *_over_years(origin, points), _table(gathering, origin, points)]
-    return Section("levels", "Levels at 4 m", blocks)
+    return Section("levels", say("Levels at 4 m"), blocks)
 
 
 # ---------------------------------------------------------------- over speed
@@ -67,23 +68,33 @@ def _over_speed(origin: Origin, points: Sequence[LevelPoint]) -> FigureBlock:
     groups = _trains(recorded) if few else _fleets(recorded)
     single = any(each.n > 1 for _, held in groups for each in band_medians(held, BAND_KM_H))
     shown = spread_out(recorded) if single else []
-    elements: list[Markers | Line | Band] = [_values(shown, "single conditions", "circle")] if shown else []
+    elements: list[Markers | Line | Band] = [_values(shown, say("single conditions"), "circle")] if shown else []
     for slot, (name, held) in enumerate(groups[:MOST_LINES]):
         elements += _line(name, band_medians(held, BAND_KM_H if few else _width(points)), slot, not few)
     if stated:
-        elements.append(_values(spread_out(stated), "stated levels", "x"))
-    words = f"{plural(len(points), 'value')} of {plural(len(trains), 'train or campaign', 'trains or campaigns')}."
+        elements.append(_values(spread_out(stated), say("stated levels"), "x"))
+    words = say(
+        "{plural} of {plural_2}.",
+        plural=plural(len(points), "value"),
+        plural_2=plural(len(trains), say("train or campaign"), say("trains or campaigns")),
+    )
     if groups:
-        words += " Lines are medians" + (f" in bands of {BAND_KM_H:g} km/h." if few else f"{_band_words(points)}.")
+        words += say(" Lines are medians") + (
+            say(" in bands of {band_km_h:g} km/h.", band_km_h=BAND_KM_H) if few else f"{_band_words(points)}."
+        )
     left = len(groups) - MOST_LINES
     if not few and left > 0:
-        words += f" {plural(left, 'fleet')} with fewer values {'has' if left == 1 else 'have'} no line."
-    left_out = shown_of(len(shown), len(recorded), "recorded values", "overview") if single else ""
+        words += say(
+            " {plural} with fewer values {value} no line.",
+            plural=plural(left, "fleet"),
+            value="has" if left == 1 else "have",
+        )
+    left_out = shown_of(len(shown), len(recorded), say("recorded values"), "overview") if single else ""
     figure = Figure(
         f"levels-over-speed-{origin}",
-        f"Level at 4 m over speed, {origin}",
+        say("Level at 4 m over speed, {origin}", origin=origin),
         f"{words}{left_out}",
-        Axis("Train speed", "km/h"),
+        Axis(say("Train speed"), "km/h"),
         _LEVEL,
         elements,
         height=440,
@@ -110,12 +121,15 @@ def _width(points: Sequence[LevelPoint]) -> float:
 
 
 def _band_words(points: Sequence[LevelPoint]) -> str:
-    return f" of a fleet in bands of {_width(points):g} km/h, with the range that 80 % of the values of a band lie in"
+    return say(
+        " of a fleet in bands of {width:g} km/h, with the range that 80 % of the values of a band lie in",
+        width=_width(points),
+    )
 
 
 def _fleets(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
     """Points by fleet, the largest first."""
-    found = grouped(points, lambda point: point.result.fleet or "no fleet")
+    found = grouped(points, lambda point: point.result.fleet or say("no fleet"))
     return sorted(found.items(), key=lambda item: -len(item[1]))
 
 
@@ -148,7 +162,11 @@ def _values(points: Sequence[LevelPoint], name: str, symbol: Symbol) -> Markers:
 
 
 def _hover(point: LevelPoint) -> str:
-    parts = (short(point.result.train, 40), f"condition {short(point.row.condition, 24)}", when(point.result))
+    parts = (
+        short(point.result.train, 40),
+        say("condition {short}", short=short(point.row.condition, 24)),
+        when(point.result),
+    )
     return ", ".join(part for part in parts if part)
 
 
@@ -160,26 +178,37 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
     years = {point.result.identity.year for point in dated}
     if len(years) < 2:
         known = (
-            f"recorded levels are known of {next(iter(years))} alone" if years else "no year is known of recorded ones"
+            say("recorded levels are known of {next} alone", next=next(iter(years)))
+            if years
+            else say("no year is known of recorded ones")
         )
-        return [Paragraph(f"Levels over years, {origin}: {known}, so there is no figure.")]
+        return [
+            Paragraph(say("Levels over years, {origin}: {known}, so there is no figure.", origin=origin, known=known))
+        ]
     groups = grouped(dated, lambda point: (point.result.fleet, band_at(point.speed_km_h, BAND_KM_H)))
     usable = {key: held for key, held in groups.items() if len({p.result.identity.year for p in held}) > 1}
     if not usable:
-        return [Paragraph(f"Levels over years, {origin}: no speed was measured in two years, so there is no figure.")]
+        return [
+            Paragraph(
+                say(
+                    "Levels over years, {origin}: no speed was measured in two years, so there is no figure.",
+                    origin=origin,
+                )
+            )
+        ]
     several = len({fleet for fleet, _ in usable}) > 1
     largest = _chosen(usable)
-    at = f" at {largest[0][1].words} km/h" if several else ""
+    at = say(" at {words} km/h", words=largest[0][1].words) if several else ""
     elements: list[Markers | Line] = []
     for slot, (fleet, band) in enumerate(sorted(largest)):
         held = usable[fleet, band]
-        name = short(fleet or "no fleet", 32) if several else f"{band.words} km/h"
+        name = short(fleet or say("no fleet"), 32) if several else f"{band.words} km/h"
         shown = spread_out(held, MOST_POINTS // OVER_YEARS)
         elements.append(
             Markers(
                 np.array([point.year for point in shown], dtype=np.float64),
                 np.array([point.level_db for point in shown]),
-                f"{name}, single",
+                say("{name}, single", name=name),
                 texts=[_hover(point) for point in shown],
                 color=slot,
                 symbol=("circle", "square", "diamond", "triangle")[slot],
@@ -187,21 +216,25 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
         )
         medians = year_medians(held)
         times, levels = (np.array(values) for values in zip(*medians, strict=True))
-        elements.append(Line(times, levels, f"{name}, median", color=slot))
-    words = (
+        elements.append(Line(times, levels, say("{name}, median", name=name), color=slot))
+    words = say(
         "Single conditions where their day is known at that day, else in the middle of their year; lines are medians "
     )
-    words += "of a year. A level may change with the track, the load and the place as well as with the train."
+    words += say("of a year. A level may change with the track, the load and the place as well as with the train.")
     rest = len(usable) - len(largest)
     if rest:
-        words += f" {plural(rest, 'more speed')} of a fleet {'was' if rest == 1 else 'were'} measured in several years."
+        words += say(
+            " {plural} of a fleet {value} measured in several years.",
+            plural=plural(rest, say("more speed")),
+            value="was" if rest == 1 else "were",
+        )
     return [
         FigureBlock(
             Figure(
                 f"levels-over-years-{origin}",
-                f"Level at 4 m over the years{at}, {origin}",
+                say("Level at 4 m over the years{at}, {origin}", at=at, origin=origin),
                 words,
-                Axis("Year"),
+                Axis(say("Year")),
                 _LEVEL,
                 elements,
                 height=400,
@@ -233,13 +266,13 @@ def _table(gathering: Gathering, origin: Origin, points: Sequence[LevelPoint]) -
     stated = any(point.row.level_from == "stated" for point in points)
     corrected = any(point.row.correction != "none" for point in points)
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("fleet", "Fleet"),
-        *([Column("level_from", "Levels")] if stated else []),
-        Column("years", "Years"),
-        Column("values", "Values", kind="number", digits=0),
+        Column("train", say("Train, else campaign")),
+        Column("fleet", say("Fleet")),
+        *([Column("level_from", say("Levels"))] if stated else []),
+        Column("years", say("Years")),
+        Column("values", say("Values"), kind="number", digits=0),
         *(Column(f"band_{band.low:.16g}_km_h", band.words, "km/h", digits=1, kind="number") for band in bands),
-        *([Column("corrected", "Background correction")] if corrected else []),
+        *([Column("corrected", say("Background correction"))] if corrected else []),
     ]
     rows: list[list[Cell]] = []
     for key in sorted(trains)[:MOST_ROWS]:
@@ -256,7 +289,9 @@ def _table(gathering: Gathering, origin: Origin, points: Sequence[LevelPoint]) -
         whose: list[Cell] = [name_cell(gathering, results), fleet or None, *([level_from] if stated else [])]
         rows.append([*whose, span or None, len(held), *medians, *([", ".join(corrections)] if corrected else [])])
     left_out = shown_of(len(rows), len(trains), "rows", "overview")
-    caption = f"Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians.{left_out}"
+    caption = say(
+        "Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians.{left_out}", origin=origin, left_out=left_out
+    )
     return Table(f"levels-{origin}", caption.rstrip("."), columns, rows, origin=origin)
 
 

@@ -7,6 +7,7 @@ from typing import Final
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, when
 
 __all__ = ["campaigns_list", "campaigns_sources"]
@@ -18,17 +19,17 @@ MOST_LEFT_OUT: Final = 100
 def campaigns_list(gathering: Gathering) -> Section:
     """Return the section with a row a campaign: those that something is to be said of first, then the newest."""
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("campaign", "Campaign"),
-        Column("date", "Date"),
-        Column("origin", "Origin", kind="origin"),
-        Column("fleet", "Fleet"),
-        Column("conditions", "Conditions", kind="number", digits=0),
-        Column("level", "Loudest at 4 m", "dB re 20 µPa", digits=1, kind="number"),
-        Column("speed", "At", "km/h", digits=0, kind="number"),
-        Column("runs", "Runs", kind="number", digits=0),
-        Column("bad", "Bad", kind="number", digits=0),
-        Column("stands_out", "Stands out", kind="number", digits=0),
+        Column("train", say("Train, else campaign")),
+        Column("campaign", say("Campaign")),
+        Column("date", say("Date")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("fleet", say("Fleet")),
+        Column("conditions", say("Conditions"), kind="number", digits=0),
+        Column("level", say("Loudest at 4 m"), "dB re 20 µPa", digits=1, kind="number"),
+        Column("speed", say("At"), "km/h", digits=0, kind="number"),
+        Column("runs", say("Runs"), kind="number", digits=0),
+        Column("bad", say("Bad"), kind="number", digits=0),
+        Column("stands_out", say("Stands out"), kind="number", digits=0),
     ]
     counts: dict[int, int] = {}
     for each in gathering.comparison.outliers:
@@ -43,26 +44,45 @@ def campaigns_list(gathering: Gathering) -> Section:
         n: list[Cell] = [result.runs, result.runs_bad, counts.get(id(result), 0)]
         rows.append([*whose, result.origin, result.fleet or None, result.n_conditions, *level, *n])
     held = len(ordered)
-    caption = "Campaigns, those with values that stand out or bad runs first, then the newest"
+    caption = say("Campaigns, those with values that stand out or bad runs first, then the newest")
     if len(rows) < held:
-        caption += f". Shown are {len(rows)} of {held}; all are in results.csv and in dataset/results.parquet"
-    return Section("campaigns", "Campaigns", [Table("campaigns", caption, columns, rows)])
+        caption += say(
+            ". Shown are {n_rows} of {held}; all are in results.csv and in dataset/results.parquet",
+            n_rows=len(rows),
+            held=held,
+        )
+    return Section("campaigns", say("Campaigns"), [Table("campaigns", caption, columns, rows)])
 
 
 def campaigns_sources(gathering: Gathering) -> Section:
     """Return the section on where the numbers come from: the dataset, and what was left out of it."""
-    words = "The dataset has a file a table; each row begins with its result, campaign, train, date, year, origin and "
-    words += "fleet. Units and references of levels are in the metadata of the columns."
-    tables: list[list[Cell]] = [[name, f"dataset/{name}.parquet", rows] for name, rows in gathering.rows.items()]
-    columns = [Column("table", "Table"), Column("file", "File"), Column("rows", "Rows", kind="number", digits=0)]
-    blocks: list[Block] = [Paragraph(words), Table("dataset", "Tables of the dataset", columns, tables)]
+    words = say(
+        "The dataset has a file a table; each row begins with its result, campaign, train, date, year, origin and "
+    )
+    words += say("fleet. Units and references of levels are in the metadata of the columns.")
+    tables: list[list[Cell]] = [
+        [name, say("dataset/{name}.parquet", name=name), rows] for name, rows in gathering.rows.items()
+    ]
+    columns = [
+        Column("table", say("Table")),
+        Column("file", say("File")),
+        Column("rows", say("Rows"), kind="number", digits=0),
+    ]
+    blocks: list[Block] = [Paragraph(words), Table("dataset", say("Tables of the dataset"), columns, tables)]
     known = sum(bool(result.identity.train) for result in gathering.results)
     dated = [result.identity for result in gathering.results if result.identity.year is not None]
     of_logs = sum(each.date_from == "log" for each in dated)
     blocks.append(
         Paragraph(
-            f"The train is known of {known} of {plural(len(gathering.results), 'campaign')}, from their [meta]; the "
-            f"year of {len(dated)}, of {of_logs} of them from the start that a log states. What is not stated is empty."
+            say(
+                "The train is known of {known} of {plural}, from their [meta]; the year of "
+                "{n_dated}, of {of_logs} of them from the start that a log states. What is not "
+                "stated is empty.",
+                known=known,
+                plural=plural(len(gathering.results), "campaign"),
+                n_dated=len(dated),
+                of_logs=of_logs,
+            )
         )
     )
     notes = [(result, result.identity.note) for result in gathering.results if result.identity.note]
@@ -70,18 +90,25 @@ def campaigns_sources(gathering: Gathering) -> Section:
         blocks.append(_notes(gathering, notes))
     if gathering.left_out:
         blocks.append(_left_out(gathering))
-    return Section("sources", "Where the numbers come from", blocks)
+    return Section("sources", say("Where the numbers come from"), blocks)
 
 
 def _notes(gathering: Gathering, notes: list[tuple[GatheredResult, str]]) -> Details:
-    columns = [Column("train", "Train, else campaign"), Column("note", "Not used")]
+    columns = [Column("train", say("Train, else campaign")), Column("note", say("Not used"))]
     rows = [[name_cell(gathering, [result]), note] for result, note in notes[:MOST_ROWS]]
-    return Details(f"Dates that could not be read: {len(notes)}", [Table("dates", "Dates", columns, rows)])
+    return Details(
+        say("Dates that could not be read: {n_notes}", n_notes=len(notes)),
+        [Table("dates", say("Dates"), columns, rows)],
+    )
 
 
 def _left_out(gathering: Gathering) -> Table:
-    columns = [Column("folder", "Folder"), Column("reason", "Why")]
+    columns = [Column("folder", say("Folder")), Column("reason", say("Why"))]
     rows = [[each.folder, each.reason] for each in gathering.left_out[:MOST_LEFT_OUT]]
     held = len(gathering.left_out)
-    more = "" if len(rows) == held else f". Shown are {len(rows)} of {held}; manifest.json names more"
-    return Table("left-out", f"Folders that are left out{more}", columns, rows)
+    more = (
+        ""
+        if len(rows) == held
+        else say(". Shown are {n_rows} of {held}; manifest.json names more", n_rows=len(rows), held=held)
+    )
+    return Table("left-out", say("Folders that are left out{more}", more=more), columns, rows)

@@ -8,6 +8,7 @@ from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.gathering.outliers import BAND_KM_H, LEVEL_FLOOR_DB, PARAMETER_FLOOR
 from tdacoustic.gathering.robust import FALSE_ALARM, FEWEST, threshold
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, when
 
 __all__ = ["campaigns_outliers", "outlier_words"]
@@ -27,19 +28,29 @@ METHOD: Final = (
 def campaigns_outliers(gathering: Gathering) -> Section:
     """Return the section on values that stand out."""
     found = gathering.comparison
-    counted = f"{plural(found.small_groups, 'group')} had fewer than {FEWEST} values"
+    counted = say("{plural} had fewer than {fewest} values", plural=plural(found.small_groups, "group"), fewest=FEWEST)
     if found.groups:
-        counted = f"{plural(found.values, 'value')} in {plural(found.groups, 'group')} were compared; {counted}"
+        counted = say(
+            "{plural} in {plural_2} were compared; {counted}",
+            plural=plural(found.values, "value"),
+            plural_2=plural(found.groups, "group"),
+            counted=counted,
+        )
     if found.left_out_parameters:
-        counted += f"; {plural(found.left_out_parameters, 'parameter')} on a bound or not determined did not count"
+        counted += say(
+            "; {plural} on a bound or not determined did not count",
+            plural=plural(found.left_out_parameters, "parameter"),
+        )
     if found.without_fleet:
-        counted += (
-            f"; {plural(found.without_fleet, 'campaign')} without a fleet {_were(found.without_fleet)} not compared"
+        counted += say(
+            "; {plural} without a fleet {were} not compared",
+            plural=plural(found.without_fleet, "campaign"),
+            were=_were(found.without_fleet),
         )
     blocks: list[Block] = [Paragraph(f"{counted}. {outlier_words(gathering)}"), Paragraph(METHOD)]
     if found.outliers:
         blocks.append(_table(gathering))
-    return Section("outliers", "What stands out", blocks)
+    return Section("outliers", say("What stands out"), blocks)
 
 
 def _were(count: int) -> str:
@@ -50,39 +61,45 @@ def outlier_words(gathering: Gathering) -> str:
     """Return in a sentence how much stands out, and what farthest."""
     found = gathering.comparison
     if not found.groups:
-        return (
-            f"No fleet has {FEWEST} campaigns with a level at one speed, or with a determined parameter: nothing can "
-            "stand out."
+        return say(
+            "No fleet has {fewest} campaigns with a level at one speed, or with a determined "
+            "parameter: nothing can stand out.",
+            fewest=FEWEST,
         )
     chance = found.groups * FALSE_ALARM
     if not found.outliers:
-        return "Nothing stands out."
+        return say("Nothing stands out.")
     first = found.outliers[0]
-    what = f"level at {first.group.what}" if first.group.kind == "level" else first.group.what
-    return (
-        f"{plural(len(found.outliers), 'value stands', 'values stand')} out, where chance alone would give about "
-        f"{chance:.2g} groups with one; the farthest is {first.result.train}, {what}: {first.value:.4g} against a "
-        f"median of {first.spread.median:.4g}."
+    what = say("level at {what}", what=first.group.what) if first.group.kind == "level" else first.group.what
+    return say(
+        "{plural} out, where chance alone would give about {chance:.2g} groups with one; the "
+        "farthest is {train}, {what}: {value:.4g} against a median of {median:.4g}.",
+        plural=plural(len(found.outliers), say("value stands"), say("values stand")),
+        chance=chance,
+        train=first.result.train,
+        what=what,
+        value=first.value,
+        median=first.spread.median,
     )
 
 
 def _table(gathering: Gathering) -> Table:
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("date", "Date"),
-        Column("origin", "Origin", kind="origin"),
-        Column("fleet", "Fleet"),
-        Column("what", "What"),
-        Column("value", "Value", kind="number"),
-        Column("median", "Median", kind="number"),
-        Column("scatter", "Scatter", kind="number"),
-        Column("distance", "Distance", "scatters", digits=1, kind="number"),
-        Column("threshold", "Threshold", "scatters", digits=1, kind="number"),
-        Column("n", "Values", kind="number", digits=0),
+        Column("train", say("Train, else campaign")),
+        Column("date", say("Date")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("fleet", say("Fleet")),
+        Column("what", say("What")),
+        Column("value", say("Value"), kind="number"),
+        Column("median", say("Median"), kind="number"),
+        Column("scatter", say("Scatter"), kind="number"),
+        Column("distance", say("Distance"), "scatters", digits=1, kind="number"),
+        Column("threshold", say("Threshold"), "scatters", digits=1, kind="number"),
+        Column("n", say("Values"), kind="number", digits=0),
     ]
     rows: list[list[Cell]] = []
     for each in gathering.comparison.outliers[:MOST_ROWS]:
-        what = f"level at {each.group.what}, dB" if each.group.kind == "level" else each.group.what
+        what = say("level at {what}, dB", what=each.group.what) if each.group.kind == "level" else each.group.what
         whose: list[Cell] = [name_cell(gathering, [each.result]), when(each.result) or None]
         whose += [each.group.origin, each.group.fleet]
         spread = each.spread
@@ -91,8 +108,10 @@ def _table(gathering: Gathering) -> Table:
         mode = f", {each.group.mode}" if each.group.mode else ""
         rows.append([*whose, what + mode, *numbers, *counts])
     held = len(gathering.comparison.outliers)
-    left_out = "" if len(rows) == held else f" Shown are the {len(rows)} farthest of {held}."
-    caption = f"Values that stand out, the farthest first.{left_out}".rstrip(".")
+    left_out = (
+        "" if len(rows) == held else say(" Shown are the {n_rows} farthest of {held}.", n_rows=len(rows), held=held)
+    )
+    caption = say("Values that stand out, the farthest first.{left_out}", left_out=left_out).rstrip(".")
     return Table("outliers", caption, columns, rows)
 
 

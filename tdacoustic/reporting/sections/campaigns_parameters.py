@@ -15,6 +15,7 @@ from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.gathering.robust import spread_of
 from tdacoustic.reporting.document import Block, Cell, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line, Markers, Rule, Symbol
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.campaigns_rows import (
     MOST_ROWS,
     name_cell,
@@ -40,7 +41,7 @@ _LOOKS: Final[tuple[tuple[State, str, int, Symbol], ...]] = (
 )
 _STATES: Final = tuple(state for state, *_ in _LOOKS)
 
-_EXPLAINED: Final = (
+_EXPLAINED: Final = mark(
     "Each campaign's own calibration, with the interval of 95 % where the data give one; an interval that is open to "
     "one side is drawn to the parameter's bound. A value on a bound, and one that the data do not determine, says "
     "nothing of the train: it is marked, and left out of medians and comparisons."
@@ -63,28 +64,33 @@ def campaigns_parameters(gathering: Gathering) -> Section | None:
     order = list(gathering.origins)
     ranked = sorted(groups, key=lambda group: (order.index(group.origin), -len(groups[group]), group.fleet, group.what))
     drawn = [group for group in ranked if len(groups[group]) > 1][:MOST_FIGURES]
-    blocks: list[Block] = [Paragraph(_EXPLAINED), _summary(ranked, groups)]
+    blocks: list[Block] = [Paragraph(say(_EXPLAINED)), _summary(ranked, groups)]
     blocks += [_figure(number, group, groups[group]) for number, group in enumerate(drawn, 1)]
     left = sum(len(groups[group]) > 1 for group in ranked) - len(drawn)
     if left:
         blocks.append(
-            Paragraph(f"{plural(left, 'more parameter')} of a fleet and origin: see dataset/parameters.parquet.")
+            Paragraph(
+                say(
+                    "{plural} of a fleet and origin: see dataset/parameters.parquet.",
+                    plural=plural(left, say("more parameter")),
+                )
+            )
         )
     blocks.append(_values(gathering, ranked, groups))
-    return Section("parameters", "Calibrated parameters", blocks)
+    return Section("parameters", say("Calibrated parameters"), blocks)
 
 
 def _summary(ranked: Sequence[Group], groups: Groups) -> Table:
     columns = [
-        Column("parameter", "Parameter"),
-        Column("origin", "Origin", kind="origin"),
-        Column("fleet", "Fleet"),
-        Column("campaigns", "Campaigns", kind="number", digits=0),
-        Column("determined", "Determined", kind="number", digits=0),
-        Column("on_a_bound", "On a bound", kind="number", digits=0),
-        Column("undetermined", "Not determined", kind="number", digits=0),
-        Column("median", "Median", "of determined ones", kind="number"),
-        Column("scatter", "Scatter", "1.4826 MAD", kind="number"),
+        Column("parameter", say("Parameter")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("fleet", say("Fleet")),
+        Column("campaigns", say("Campaigns"), kind="number", digits=0),
+        Column("determined", say("Determined"), kind="number", digits=0),
+        Column("on_a_bound", say("On a bound"), kind="number", digits=0),
+        Column("undetermined", say("Not determined"), kind="number", digits=0),
+        Column("median", say("Median"), say("of determined ones"), kind="number"),
+        Column("scatter", say("Scatter"), say("1.4826 MAD"), kind="number"),
     ]
     rows: list[list[Cell]] = []
     for group in ranked[:MOST_ROWS]:
@@ -95,7 +101,9 @@ def _summary(ranked: Sequence[Group], groups: Groups) -> Table:
         counts: list[Cell] = [len(groups[group]), *(states[state] for state in _STATES)]
         rows.append([group.what, group.origin, group.fleet or None, *counts, *middle])
     left_out = shown_of(len(rows), len(ranked), "rows", "parameters")
-    return Table("parameters", f"Calibrated parameters by fleet.{left_out}".rstrip("."), columns, rows)
+    return Table(
+        "parameters", say("Calibrated parameters by fleet.{left_out}", left_out=left_out).rstrip("."), columns, rows
+    )
 
 
 # ---------------------------------------------------------------- figures
@@ -139,7 +147,7 @@ def _forest(name: str, what: str, words: str, key: Axis, ordered: Sequence[Entry
         if across:
             x = np.array([value for _, ends in across for value in (*ends, ends[1])])
             y = np.array([value for place, _ in across for value in (place, place, np.nan)], dtype=np.float64)
-            elements.append(Line(x, y, legend, color=slot, group="interval of 95 %", width=2.0, opacity=0.55))
+            elements.append(Line(x, y, legend, color=slot, group=say("interval of 95 %"), width=2.0, opacity=0.55))
         if held:
             at = np.array([places[id(result)] for result, _ in held], dtype=np.float64)
             shown = np.array([fitted.value for _, fitted in held], dtype=np.float64)
@@ -148,10 +156,12 @@ def _forest(name: str, what: str, words: str, key: Axis, ordered: Sequence[Entry
     if median is not None:
         elements.append(Rule(median, "median"))
     names = [short(f"{result.train} {when(result)[:4]}".strip()) for result, _ in reversed(ordered)]
-    caption = f"{words}A row a campaign, by value; the dashed line is the median of the determined ones."
+    caption = say(
+        "{words}A row a campaign, by value; the dashed line is the median of the determined ones.", words=words
+    )
     height = min(150 + 22 * len(ordered), 1600)
-    axis = Axis("Campaign", names=names, limits=(-0.7, len(ordered) - 0.3))
-    return Figure(name, f"Calibrated {what}", caption, key, axis, elements, height=height)
+    axis = Axis(say("Campaign"), names=names, limits=(-0.7, len(ordered) - 0.3))
+    return Figure(name, say("Calibrated {what}", what=what), caption, key, axis, elements, height=height)
 
 
 def _in_order(name: str, what: str, words: str, key: Axis, ordered: Sequence[Entry], median: float | None) -> Figure:
@@ -160,23 +170,28 @@ def _in_order(name: str, what: str, words: str, key: Axis, ordered: Sequence[Ent
     elements: list[Line | Markers] = []
     if median is not None:
         whole = np.array([0.0, len(shown) - 1.0])
-        elements.append(Line(whole, np.full(2, median), "median of determined ones", "dashed", color=7))
+        elements.append(Line(whole, np.full(2, median), say("median of determined ones"), "dashed", color=7))
     for state, legend, slot, symbol in _LOOKS:
         held = [(place, result, fitted) for place, (result, fitted) in enumerate(shown) if fitted.state == state]
         upright = [(place, ends) for place, _, fitted in held if (ends := _ends(fitted)) is not None]
         if upright:
             x = np.array([float(value) for place, _ in upright for value in (place, place, place)])
             y = np.array([value for _, ends in upright for value in (*ends, np.nan)])
-            elements.append(Line(x, y, legend, color=slot, group="interval of 95 %", width=1.0, opacity=0.45))
+            elements.append(Line(x, y, legend, color=slot, group=say("interval of 95 %"), width=1.0, opacity=0.45))
         if held:
             at = np.array([float(place) for place, _, _ in held])
             values = np.array([fitted.value for *_, fitted in held], dtype=np.float64)
             texts = [_hover(result, fitted) for _, result, fitted in held]
             elements.append(Markers(at, values, legend, texts=texts, symbol=symbol, color=slot))
-    left_out = shown_of(len(shown), len(ordered), "campaigns, evenly,", "parameters")
-    places = Axis("Campaigns in order", limits=(-1.0, float(len(shown))))
-    caption = f"{words}{plural(len(ordered), 'campaign')} in the order of their values.{left_out}"
-    return Figure(name, f"Calibrated {what}", caption, places, key, elements, height=420)
+    left_out = shown_of(len(shown), len(ordered), say("campaigns, evenly,"), "parameters")
+    places = Axis(say("Campaigns in order"), limits=(-1.0, float(len(shown))))
+    caption = say(
+        "{words}{plural} in the order of their values.{left_out}",
+        words=words,
+        plural=plural(len(ordered), "campaign"),
+        left_out=left_out,
+    )
+    return Figure(name, say("Calibrated {what}", what=what), caption, places, key, elements, height=420)
 
 
 def _hover(result: GatheredResult, fitted: FittedValue) -> str:
@@ -189,15 +204,15 @@ def _hover(result: GatheredResult, fitted: FittedValue) -> str:
 
 def _values(gathering: Gathering, ranked: Sequence[Group], groups: Groups) -> Details:
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("date", "Date"),
-        Column("origin", "Origin", kind="origin"),
-        Column("fleet", "Fleet"),
-        Column("parameter", "Parameter"),
-        Column("value", "Value", kind="number"),
-        Column("ci95_low", "From", "95 %", kind="number"),
-        Column("ci95_high", "To", "95 %", kind="number"),
-        Column("state", "State"),
+        Column("train", say("Train, else campaign")),
+        Column("date", say("Date")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("fleet", say("Fleet")),
+        Column("parameter", say("Parameter")),
+        Column("value", say("Value"), kind="number"),
+        Column("ci95_low", say("From"), "95 %", kind="number"),
+        Column("ci95_high", say("To"), "95 %", kind="number"),
+        Column("state", say("State")),
     ]
     entries = [(group, entry) for group in ranked for entry in groups[group]]
     entries.sort(key=lambda item: item[1][1].state == "determined")  # what is doubtful first
@@ -207,5 +222,5 @@ def _values(gathering: Gathering, ranked: Sequence[Group], groups: Groups) -> De
         numbers: list[Cell] = [fitted.value, *fitted.ci95]
         rows.append([*whose, group.what, *numbers, fitted.state])
     left_out = shown_of(len(rows), len(entries), "values", "parameters")
-    caption = f"Values, doubtful ones first.{left_out}".rstrip(".")
-    return Details("Values of single campaigns", [Table("parameter-values", caption, columns, rows)])
+    caption = say("Values, doubtful ones first.{left_out}", left_out=left_out).rstrip(".")
+    return Details(say("Values of single campaigns"), [Table("parameter-values", caption, columns, rows)])

@@ -8,21 +8,23 @@ from typing import Final
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, shown_of, when
 
 __all__ = ["bad_words", "campaigns_quality"]
 
-_NOT_A_CHECK: Final = "level without log"
+_NOT_A_CHECK: Final = mark("level without log")
 
 
 def campaigns_quality(gathering: Gathering) -> Section | None:
     """Return the section on data problems; None where no run was checked."""
     if not any(result.runs for result in gathering.results):
         return None
-    words = (
-        f"{bad_words(gathering)} A run counts as bad where a check of it or of one of its channels is bad: then that "
+    words = say(
+        "{bad} A run counts as bad where a check of it or of one of its channels is bad: then that ",
+        bad=bad_words(gathering),
     )
-    words += "channel is not used. Limits of the checks are assumed, from practice."
+    words += say("channel is not used. Limits of the checks are assumed, from practice.")
     blocks: list[Block] = [Paragraph(words)]
     reasons = _reasons(gathering)
     if reasons is not None:
@@ -30,7 +32,7 @@ def campaigns_quality(gathering: Gathering) -> Section | None:
     worst = _worst(gathering)
     if worst is not None:
         blocks.append(worst)
-    return Section("data", "Data problems", blocks)
+    return Section("data", say("Data problems"), blocks)
 
 
 def bad_words(gathering: Gathering) -> str:
@@ -46,23 +48,34 @@ def bad_words(gathering: Gathering) -> str:
             for count in result.quality:
                 if count.verdict == "bad":
                     counts[count.check] = counts.get(count.check, 0) + count.runs
-        why = f", most often for {max(counts, key=lambda check: (counts[check], check))}" if bad and counts else ""
+        why = (
+            say(", most often for {counts}", counts=max(counts, key=lambda check: (counts[check], check)))
+            if bad and counts
+            else ""
+        )
         said.append(
-            f"Of {plural(runs, f'{origin} run')} {bad} {'is' if bad == 1 else 'are'} bad{why}; {warned} more "
-            f"{'has' if warned == 1 else 'have'} a warning."
+            say(
+                "Of {plural} {bad} {value} bad{why}; {warned} more {value_2} a warning.",
+                plural=plural(runs, say("{origin} run", origin=origin)),
+                bad=bad,
+                value="is" if bad == 1 else "are",
+                why=why,
+                warned=warned,
+                value_2="has" if warned == 1 else "have",
+            )
         )
     return " ".join(said)
 
 
 def _reasons(gathering: Gathering) -> Table | None:
     columns = [
-        Column("check", "Check"),
-        Column("origin", "Origin", kind="origin"),
-        Column("verdict", "Verdict", kind="verdict"),
-        Column("campaigns", "Campaigns", kind="number", digits=0),
-        Column("runs", "Runs", kind="number", digits=0),
-        Column("example", "For example"),
-        Column("detail", "Finding"),
+        Column("check", say("Check")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("verdict", say("Verdict"), kind="verdict"),
+        Column("campaigns", say("Campaigns"), kind="number", digits=0),
+        Column("runs", say("Runs"), kind="number", digits=0),
+        Column("example", say("For example")),
+        Column("detail", say("Finding")),
     ]
     held: dict[tuple[str, str, str], list[tuple[GatheredResult, int, str]]] = {}
     for result in gathering.results:
@@ -80,19 +93,19 @@ def _reasons(gathering: Gathering) -> Table | None:
         results = [result for result, _, _ in entries]
         counts: list[Cell] = [len(entries), runs]
         rows.append([check, origin, verdict, *counts, name_cell(gathering, results[:1]), entries[0][2][:160]])
-    return Table("data-reasons", "What is bad or doubtful, and how often", columns, rows) if rows else None
+    return Table("data-reasons", say("What is bad or doubtful, and how often"), columns, rows) if rows else None
 
 
 def _worst(gathering: Gathering) -> Table | None:
     columns = [
-        Column("train", "Train, else campaign"),
-        Column("campaign", "Campaign"),
-        Column("date", "Date"),
-        Column("origin", "Origin", kind="origin"),
-        Column("runs", "Runs", kind="number", digits=0),
-        Column("bad", "Bad", kind="number", digits=0),
-        Column("warned", "With a warning", kind="number", digits=0),
-        Column("why", "Bad checks"),
+        Column("train", say("Train, else campaign")),
+        Column("campaign", say("Campaign")),
+        Column("date", say("Date")),
+        Column("origin", say("Origin"), kind="origin"),
+        Column("runs", say("Runs"), kind="number", digits=0),
+        Column("bad", say("Bad"), kind="number", digits=0),
+        Column("warned", say("With a warning"), kind="number", digits=0),
+        Column("why", say("Bad checks")),
     ]
     bad = sorted((r for r in gathering.results if r.runs_bad), key=lambda r: (-r.runs_bad / r.runs, -r.runs_bad))
     rows: list[list[Cell]] = []
@@ -101,7 +114,7 @@ def _worst(gathering: Gathering) -> Table | None:
         whose: list[Cell] = [name_cell(gathering, [result]), result.campaign, when(result) or None, result.origin]
         rows.append([*whose, *counts, _why(result)])
     left_out = shown_of(len(rows), len(bad), "campaigns", "results")
-    caption = f"Campaigns with bad runs, the largest part first.{left_out}".rstrip(".")
+    caption = say("Campaigns with bad runs, the largest part first.{left_out}", left_out=left_out).rstrip(".")
     return Table("data-worst", caption, columns, rows) if rows else None
 
 

@@ -9,6 +9,7 @@ from typing import Final, TypeVar
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Cell, Link
+from tdacoustic.reporting.language import say
 
 __all__ = [
     "MOST_POINTS",
@@ -76,7 +77,17 @@ def shown_of(shown: int, held: int, what: str, table: str) -> str:
     >>> shown_of(200, 512, "trains", "overview")
     ' Shown are 200 of 512 trains; all are in dataset/overview.parquet.'
     """
-    return "" if shown >= held else f" Shown are {shown} of {held} {what}; all are in dataset/{table}.parquet."
+    return (
+        ""
+        if shown >= held
+        else say(
+            " Shown are {shown} of {held} {what}; all are in dataset/{table}.parquet.",
+            shown=shown,
+            held=held,
+            what=what,
+            table=table,
+        )
+    )
 
 
 def spread_out(values: Sequence[T], most: int = MOST_POINTS) -> list[T]:

@@ -7,6 +7,7 @@ import numpy as np
 from tdacoustic.measured.run_clocks import LogClock, RunClocks
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.words import pretty_signs, slug
 from tdacoustic.results import Analysis
 
@@ -26,8 +27,8 @@ _COLUMNS = (
     Column("peak_ratio", "Peak over next", "", 2, "number"),
     Column("doubt", "Doubt"),
 )
-_METHODS = {"start": "started together", "time_stamps": "time stamps", "shared": "shared signal"}
-_METHOD = (
+_METHODS = {"start": mark("started together"), "time_stamps": mark("time stamps"), "shared": mark("shared signal")}
+_METHOD = mark(
     "A log's time is moved and its sampling rate corrected to the reference log's clock; its samples stay as they are. "
     "With a shared signal, windows of one log are sought in the other, then the slope of the cross-spectrum's phase in "
     "many short windows gives the delay along the record, and a robust line through them offset and drift. Errors are "
@@ -42,41 +43,63 @@ def clocks(analysis: Analysis) -> Section | None:
     if not held:
         return None
     blocks: list[Block] = [Paragraph(pretty_signs(_sentence(run))) for run in held.values()]
-    doubts = [f"Run {run.run}: {doubt}." for run in held.values() for clock in run.clocks for doubt in clock.doubts]
+    doubts = [
+        say("Run {run}: {doubt}.", run=run.run, doubt=doubt)
+        for run in held.values()
+        for clock in run.clocks
+        for doubt in clock.doubts
+    ]
     blocks += [Notice("warning", pretty_signs(doubt)) for doubt in doubts]
     rows = [_cells(run, clock) for run in held.values() for clock in run.clocks]
     origin = analysis.campaign.origin
-    blocks.append(Table("clocks", "Clocks of the logs", _COLUMNS, rows, origin=origin))
+    blocks.append(Table("clocks", say("Clocks of the logs"), _COLUMNS, rows, origin=origin))
     for run in held.values():
         blocks += [FigureBlock(_figure(run, clock), origin) for clock in run.clocks if _has_figure(clock)]
-    blocks.append(Paragraph(_METHOD))
-    return Section("clocks", "Several logs on one time axis", blocks)
+    blocks.append(Paragraph(say(_METHOD)))
+    return Section("clocks", say("Several logs on one time axis"), blocks)
 
 
 def _sentence(run: RunClocks) -> str:
     first = run.clocks[0]
     others = ", ".join(clock.log for clock in run.clocks)
     if run.method == "start":
-        return (
-            f"Run {run.run}: {others} and {first.reference_log} are taken as started together; no drift is corrected."
+        return say(
+            "Run {run}: {others} and {reference_log} are taken as started together; no drift is corrected.",
+            run=run.run,
+            others=others,
+            reference_log=first.reference_log,
         )
     if run.method == "time_stamps":
-        parts = [f"{clock.log} {clock.offset_s:.6g} s after it" for clock in run.clocks]
-        return (
-            f"Run {run.run}: by their time stamps the logs start at {first.reference_log}'s and {', '.join(parts)}; "
-            "no drift is corrected."
+        parts = [say("{log} {offset_s:.6g} s after it", log=clock.log, offset_s=clock.offset_s) for clock in run.clocks]
+        return say(
+            "Run {run}: by their time stamps the logs start at {reference_log}'s and {parts}; no drift is corrected.",
+            run=run.run,
+            reference_log=first.reference_log,
+            parts=", ".join(parts),
         )
     parts = [
-        f"{clock.log} starts at {clock.offset_s:.6f} s and its clock runs {abs(clock.drift_ppm or 0.0):.3g} ppm "
-        f"{'fast' if (clock.drift_ppm or 0.0) > 0.0 else 'slow'}"
-        f"{' (its shared channel has the sign turned round)' if clock.estimate and clock.estimate.inverted else ''}"
+        say(
+            "{log} starts at {offset_s:.6f} s and its clock runs {drift_ppm:.3g} ppm {value}{value_2}",
+            log=clock.log,
+            offset_s=clock.offset_s,
+            drift_ppm=abs(clock.drift_ppm or 0.0),
+            value="fast" if (clock.drift_ppm or 0.0) > 0.0 else "slow",
+            value_2=say(" (its shared channel has the sign turned round)")
+            if clock.estimate and clock.estimate.inverted
+            else "",
+        )
         for clock in run.clocks
     ]
     errors = [_axis_error(clock) for clock in run.clocks]
     worst = max((error for error in errors if error is not None), default=0.0)
-    return (
-        f"Run {run.run}: by the shared signal and {first.reference_log}'s clock, {'; '.join(parts)}. Any instant that "
-        f"both logs hold is known within {worst:.2g} samples (standard error); nothing is resampled by that."
+    return say(
+        "Run {run}: by the shared signal and {reference_log}'s clock, {parts}. Any instant that "
+        "both logs hold is known within {worst:.2g} samples (standard error); nothing is "
+        "resampled by that.",
+        run=run.run,
+        reference_log=first.reference_log,
+        parts="; ".join(parts),
+        worst=worst,
     )
 
 
@@ -92,7 +115,7 @@ def _cells(run: RunClocks, clock: LogClock) -> tuple[Cell, ...]:
         run.run,
         clock.log,
         clock.reference_log,
-        _METHODS[clock.method],
+        say(_METHODS[clock.method]),
         clock.offset_s,
         None if clock.offset_error_s is None else 1e6 * clock.offset_error_s,
         clock.drift_ppm,
@@ -113,12 +136,12 @@ def _figure(run: RunClocks, clock: LogClock) -> Figure:
     left = clock.estimate.residuals
     return Figure(
         slug("clock", run.run, clock.log),
-        f"What offset and drift leave of the delay of {clock.log}, run {run.run}",
-        "Neighbouring windows together, with standard errors. A clock that runs evenly leaves scatter about zero.",
-        Axis("Time", "s"),
-        Axis("Delay", "µs"),
+        say("What offset and drift leave of the delay of {log}, run {run}", log=clock.log, run=run.run),
+        say("Neighbouring windows together, with standard errors. A clock that runs evenly leaves scatter about zero."),
+        Axis(say("Time"), "s"),
+        Axis(say("Delay"), "µs"),
         (
-            Line(left.times_s[[0, -1]], np.zeros(2), "even clock", style="dashed"),
+            Line(left.times_s[[0, -1]], np.zeros(2), say("even clock"), style="dashed"),
             Markers(left.times_s, 1e6 * left.delays_s, "delay", errors=1e6 * left.errors_s),
         ),
         height=240,

@@ -7,6 +7,7 @@ from typing import Final
 from tdacoustic.attribution import CampaignContributions, ContributionState
 from tdacoustic.attribution.line_coherence import LineCoherence
 from tdacoustic.reporting.document import Block, Column, Paragraph, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.results import Analysis
 
@@ -20,7 +21,7 @@ def state_words(state: ContributionState) -> str:
     """Speed of an operating state in words; empty where it is not known."""
     if state.train_speed_km_h is not None:
         return f"{state.train_speed_km_h:.3g} km/h"
-    return "" if state.motor_hz is None else f"motor {60.0 * state.motor_hz:.4g} rpm"
+    return "" if state.motor_hz is None else say("motor {motor_hz:.4g} rpm", motor_hz=60.0 * state.motor_hz)
 
 
 def coherence(analysis: Analysis, found: CampaignContributions, receiver: str) -> Section:
@@ -55,37 +56,41 @@ def coherence(analysis: Analysis, found: CampaignContributions, receiver: str) -
                 )
             )
     columns = (
-        Column("run", "Run"),
-        Column("speed", "Speed", align="right"),
-        Column("frequency_hz", "Line", "Hz", 0, "number"),
-        Column("multiple", "All sensors", "with the microphone"),
-        Column("best", "Best sensor"),
-        Column("pair", "Sensors of two components", "the most coherent"),
-        Column("between", "Coherence", "of these"),
+        Column("run", say("Run")),
+        Column("speed", say("Speed"), align="right"),
+        Column("frequency_hz", say("Line"), "Hz", 0, "number"),
+        Column("multiple", say("All sensors"), say("with the microphone")),
+        Column("best", say("Best sensor")),
+        Column("pair", say("Sensors of two components"), say("the most coherent")),
+        Column("between", say("Coherence"), say("of these")),
     )
-    words = (
+    words = say(
         "Squared coherences, corrected for their bias. What all sensors together leave to one is noise of the "
         "microphone or a source without a sensor. Where sensors of two components are coherent, one of them hears the "
         "other, and contributions rest on how far the runs tell them apart."
     )
     blocks: list[Block] = [Paragraph(f"{_coherent_words(found)}{words}")]
     if rows:
-        title = f"Squared coherence at the loudest lines, {receiver} (95 %)"
+        title = say("Squared coherence at the loudest lines, {receiver} (95 %)", receiver=receiver)
         table = Table("coherence-lines", title, columns, rows, origin=analysis.campaign.origin)
-        blocks.append(in_sight(table, "Coherence at the loudest lines"))
-    return Section("coherence", "Coherence of sensors and microphones", blocks)
+        blocks.append(in_sight(table, say("Coherence at the loudest lines")))
+    return Section("coherence", say("Coherence of sensors and microphones"), blocks)
 
 
 def _coherence_words(item: LineCoherence) -> str:
-    return f"{item.corrected:.2f} ({item.low:.2f} to {item.high:.2f})"
+    return say("{corrected:.2f} ({low:.2f} to {high:.2f})", corrected=item.corrected, low=item.low, high=item.high)
 
 
 def _coherent_words(found: CampaignContributions) -> str:
     worst = max(found.result.coherent, key=lambda item: item.coherence, default=None)
     if worst is None:
-        return "One component alone has sensors, so nothing is coherent with another's. "
+        return say("One component alone has sensors, so nothing is coherent with another's. ")
     state = next(state for state in found.states if state.name == worst.state)
-    return (
-        f"The most coherent sensors of two components are {worst.first} and {worst.second} in run {state.run}, "
-        f"{worst.coherence:.2f} over its loudest lines. "
+    return say(
+        "The most coherent sensors of two components are {first} and {second} in run {run}, "
+        "{coherence:.2f} over its loudest lines. ",
+        first=worst.first,
+        second=worst.second,
+        run=state.run,
+        coherence=worst.coherence,
     )

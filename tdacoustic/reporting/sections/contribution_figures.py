@@ -13,6 +13,7 @@ from tdacoustic.attribution.contribution_spans import NamedSpan
 from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart, SpanContributions
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.coherence import state_words
 from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, slug
 from tdacoustic.tables.contributions import power_db
@@ -27,8 +28,8 @@ NO_LOWER_DB: Final = 15.0
 FEW: Final = 12
 """Values of a trace up to which each has its dot."""
 SYMBOLS: Final = {"ok": "circle", "flagged": "x", "refused": "triangle", "below": "triangle"}
-WORDS: Final = {"ok": "", "flagged": ", flagged", "bound": ", at most"}
-DRAWN: Final = (
+WORDS: Final = {"ok": "", "flagged": mark(", flagged"), "bound": mark(", at most")}
+DRAWN: Final = mark(
     "A dot is known, a cross flagged, a triangle an upper bound of what is refused or does not stand above its "
     "scatter; the bars are the ranges of the table, and those without a lower end are drawn 15 dB down."
 )
@@ -37,20 +38,25 @@ DRAWN: Final = (
 def db_words(mean_square: float | None) -> str:
     """Return a power as a level in words."""
     level = power_db(mean_square)
-    return "no power" if level is None else f"{level:.1f} dB"
+    return say("no power") if level is None else f"{level:.1f} dB"
 
 
 def _range(part: GroupPart) -> str:
     low, high = power_db(part.low), power_db(part.high)
     if high is None:
         return ""
-    return f"at most {high:.1f}" if low is None else f"{low:.1f} to {high:.1f}"
+    return say("at most {high:.1f}", high=high) if low is None else say("{low:.1f} to {high:.1f}", low=low, high=high)
 
 
 def part_words(name: str, part: GroupPart) -> str:
     """Return the part of a component in words: level, verdict and range, or its upper bound."""
     if part.verdict in ("refused", "below"):
-        return f"{name} {'refused, ' if part.verdict == 'refused' else ''}at most {db_words(part.high)}"
+        return say(
+            "{name} {value}at most {db}",
+            name=name,
+            value="refused, " if part.verdict == "refused" else "",
+            db=db_words(part.high),
+        )
     return f"{name} {db_words(part.mean_square)} ({'flagged, ' if part.verdict == 'flagged' else ''}{_range(part)})"
 
 
@@ -68,7 +74,7 @@ def _measured(x: Array, rows: Sequence[SpanContributions], traces: Sequence[str]
         own = np.array([other == trace for other in traces])
         yield Line(x[own], total[own], "measured", color=7, group="measured", points=points)
         if np.isfinite(rest[own]).any():
-            words = "explained by no sensor"
+            words = say("explained by no sensor")
             yield Line(x[own], rest[own], words, style="dashed", color=3, group=words, points=points)
 
 
@@ -108,13 +114,22 @@ def _part_elements(name: str, x: Array, parts: Sequence[GroupPart], slot: int) -
             bars_x += [float(place)] * 3
             bars_y += [level - NO_LOWER_DB if low is None else low, high, np.nan]
     if bars_x:
-        found.append(Line(np.array(bars_x), np.array(bars_y), f"{name}: range", color=slot, opacity=0.5, group="range"))
+        found.append(
+            Line(
+                np.array(bars_x),
+                np.array(bars_y),
+                say("{name}: range", name=name),
+                color=slot,
+                opacity=0.5,
+                group="range",
+            )
+        )
     for kind, points in groups.items():
         found.append(
             Markers(
                 np.array([p[0] for p in points]),
                 np.array([p[1] for p in points]),
-                f"{name}{WORDS[kind]}",
+                f"{name}{say(WORDS[kind])}",
                 texts=tuple(p[2] for p in points),
                 symbol=SYMBOLS.get(kind, "triangle"),  # type: ignore[arg-type]
                 color=slot,
@@ -151,9 +166,9 @@ def over_frequency(found: CampaignContributions, held: Sequence[Row], receiver: 
         elements = _elements(found, centres, [parts for _, parts in rows], logarithmic=True)
         speed = f", {state_words(state)}" if state_words(state) else ""
         name = slug("contributions", receiver, state.name, state.run)
-        title = f"Contributions at {receiver}, run {state.run}{speed}"
-        caption = f"In third octaves. {_drawn([parts for _, parts in rows])}"
-        figures.append(_figure(name, title, caption, Axis("Frequency", "Hz", "log"), elements, 360))
+        title = say("Contributions at {receiver}, run {run}{speed}", receiver=receiver, run=state.run, speed=speed)
+        caption = say("In third octaves. {drawn}", drawn=_drawn([parts for _, parts in rows]))
+        figures.append(_figure(name, title, caption, Axis(say("Frequency"), "Hz", "log"), elements, 360))
     return figures
 
 
@@ -173,31 +188,33 @@ def over_speed(
     """
     figures = []
     speeds = {state.name: state.train_speed_km_h for state in found.states}
-    axis = Axis("Train speed", "km/h")
+    axis = Axis(say("Train speed"), "km/h")
     if any(speed is None for speed in speeds.values()):
         speeds = {state.name: None if state.motor_hz is None else 60.0 * state.motor_hz for state in found.states}
-        axis = Axis("Motor speed", "rpm")
-    for kind, what in (("tones", "the tones"), ("total", "the whole sound")):
+        axis = Axis(say("Motor speed"), "rpm")
+    for kind, what in (("tones", say("the tones")), ("total", say("the whole sound"))):
         rows = [(speed, s, p) for s, span, p in held if span.kind == kind and (speed := speeds[s.name]) is not None]
         rows.sort(key=lambda row: row[0])
         if len({speed for speed, *_ in rows}) < 2:
             continue
         parts = [part for *_, part in rows]
-        traces = [f"steady, {modes.get(s.run, '')}" if s.steady else s.run for _, s, _ in rows]
+        traces = [say("steady, {run}", run=modes.get(s.run, "")) if s.steady else s.run for _, s, _ in rows]
         elements = _elements(found, [speed for speed, *_ in rows], parts, logarithmic=False, traces=traces)
         name = slug(f"contributions-over-speed-{kind}", receiver)
-        title = f"Contributions to {what} over speed at {receiver}"
-        words = "Lines join the speeds of one run-up, and steady runs of one mode. " if len(set(traces)) > 1 else ""
+        title = say("Contributions to {what} over speed at {receiver}", what=what, receiver=receiver)
+        words = (
+            say("Lines join the speeds of one run-up, and steady runs of one mode. ") if len(set(traces)) > 1 else ""
+        )
         figures.append(_figure(name, title, f"{words}{_drawn(parts)}", axis, elements, 340))
     return figures
 
 
 def _drawn(rows: Sequence[SpanContributions]) -> str:
     """What the signs mean, and what is left out."""
-    left_out = " What no sensor explains is left out where the paths differ from state to state."
-    return DRAWN + (left_out if any(paths_changed(parts) for parts in rows) else "")
+    left_out = say(" What no sensor explains is left out where the paths differ from state to state.")
+    return say(DRAWN) + (left_out if any(paths_changed(parts) for parts in rows) else "")
 
 
 def _figure(name: str, title: str, caption: str, x: Axis, elements: Sequence[Element], height: int) -> Figure:
-    level = Axis("Sound pressure level", "dB", reference="20 µPa", limits=_limits(elements))
+    level = Axis(say("Sound pressure level"), "dB", reference="20 µPa", limits=_limits(elements))
     return Figure(name, title, caption, x, level, elements, height=height)

@@ -10,6 +10,7 @@ from tdacoustic.attribution.contribution_spans import NamedSpan
 from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart, SpanContributions
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.coherence import coherence, state_words
 from tdacoustic.reporting.sections.contribution_figures import (
     Row,
@@ -30,7 +31,7 @@ IN_SIGHT: Final = 3
 MOST: Final = 0.5
 """Part of the sound from which on it is said that no sensor explains it."""
 
-METHOD = (
+METHOD = mark(
     "A contribution is the power at the microphone that moves with a component's sensors, by transfer paths of all "
     "runs together; cross-talk between the sensors is taken off as far as the runs differ enough in the mix of their "
     "sources to tell it. Known: cross-talk leaves less than 3 dB open. Flagged: more, so the level is what the sensors "
@@ -54,12 +55,17 @@ def contributions(analysis: Analysis) -> Section | None:
         *_of_receiver(analysis, found, rows, first, figures=True),
     ]
     for receiver in others:
-        blocks.append(Details(f"The same at {receiver}", _of_receiver(analysis, found, rows, receiver, figures=False)))
-    blocks += [Paragraph(METHOD)]
+        blocks.append(
+            Details(
+                say("The same at {receiver}", receiver=receiver),
+                _of_receiver(analysis, found, rows, receiver, figures=False),
+            )
+        )
+    blocks += [Paragraph(say(METHOD))]
     if found.notes:
-        blocks.append(Sentences([f"Left out: {note}." for note in found.notes]))
+        blocks.append(Sentences([say("Left out: {note}.", note=note) for note in found.notes]))
     blocks.append(coherence(analysis, found, first))
-    return Section("contributions", "How many decibels come from where", blocks)
+    return Section("contributions", say("How many decibels come from where"), blocks)
 
 
 def _of_receiver(
@@ -74,15 +80,19 @@ def _of_receiver(
     if len(drawn) <= IN_SIGHT:
         blocks += drawn
     else:
-        blocks.append(Details(f"Contributions over frequency, {len(drawn)} operating states", drawn))
+        blocks.append(
+            Details(say("Contributions over frequency, {n_drawn} operating states", n_drawn=len(drawn)), drawn)
+        )
     whole = [row for row in held if row[1].kind in ("total", "tones", "broadband")]
     single = [row for row in held if row[1].kind in ("order", "tone")]
-    table = _table(analysis, found, whole, slug("contributions", receiver), f"Contributions at {receiver}")
-    blocks.append(in_sight(table, f"Contributions at {receiver} as a table"))
+    table = _table(
+        analysis, found, whole, slug("contributions", receiver), say("Contributions at {receiver}", receiver=receiver)
+    )
+    blocks.append(in_sight(table, say("Contributions at {receiver} as a table", receiver=receiver)))
     if single:
-        title = f"Contributions at {receiver}, tone by tone"
+        title = say("Contributions at {receiver}, tone by tone", receiver=receiver)
         table = _table(analysis, found, single, slug("contributions-of-tones", receiver), title)
-        blocks.append(Details(f"Tone by tone and order by order, {len(single)} rows", [table]))
+        blocks.append(Details(say("Tone by tone and order by order, {n_single} rows", n_single=len(single)), [table]))
     return [*blocks, *_reasons(held, receiver)]
 
 
@@ -97,16 +107,28 @@ def _answer(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row
         held = [row for row in rows if row[0].run == run and row[2].receiver == receiver]
         if held:
             sentences.append(pretty_signs(_sentence(held, several=len(runs) > len(analysis.campaign.conditions()))))
-    words = f"At {receiver}, by the paths of {len(found.states)} operating states together"
+    words = say(
+        "At {receiver}, by the paths of {n_states} operating states together",
+        receiver=receiver,
+        n_states=len(found.states),
+    )
     if len(found.states) == 1:
-        words = f"At {receiver}, from a single operating state, which cannot tell cross-talk from a source"
+        words = say(
+            "At {receiver}, from a single operating state, which cannot tell cross-talk from a source",
+            receiver=receiver,
+        )
     low, high = next(parts.band_hz for _, span, parts in rows if span.kind == "total" and parts.receiver == receiver)
-    return [Paragraph(f"{words}, {low:.4g} to {high:.4g} Hz:"), Sentences(sentences)]
+    return [
+        Paragraph(say("{words}, {low:.4g} to {high:.4g} Hz:", words=words, low=low, high=high)),
+        Sentences(sentences),
+    ]
 
 
 def _sentence(held: Sequence[Row], several: bool) -> str:
     state = held[0][0]
-    what = f"Condition {state.condition}" + (f", run {state.run}" if several else "")
+    what = say("Condition {condition}", condition=state.condition) + (
+        say(", run {run}", run=state.run) if several else ""
+    )
     if not state.steady:
         return f"{what}, {_run_up_words(held)}"
     speed = f" ({state_words(state)})" if state_words(state) else ""
@@ -115,19 +137,26 @@ def _sentence(held: Sequence[Row], several: bool) -> str:
     said = f"{what}{speed}: "
     if tones is not None:
         told = joined([part_words(name, part) for name, part in tones.groups.items()])
-        said += f"of the tones' {db_words(tones.total)}: {told}; {_unexplained(tones)}. "
-        said += f"Of all {db_words(total.total)} "
+        said += say(
+            "of the tones' {db}: {told}; {unexplained}. ",
+            db=db_words(tones.total),
+            told=told,
+            unexplained=_unexplained(tones),
+        )
+        said += say("Of all {db} ", db=db_words(total.total))
     else:
         told = joined([part_words(name, part) for name, part in total.groups.items()])
-        said += f"of {db_words(total.total)}: {told}; "
+        said += say("of {db}: {told}; ", db=db_words(total.total), told=told)
     return said + f"{_unexplained(total)}."
 
 
 def _unexplained(parts: SpanContributions) -> str:
     if paths_changed(parts):
-        return "the paths differ from state to state, so what no sensor explains is not known"
+        return say("the paths differ from state to state, so what no sensor explains is not known")
     share = 100.0 * parts.residual / parts.total if parts.total > 0.0 else 0.0
-    return f"no sensor explains {db_words(parts.residual)}" + (f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else "")
+    return say("no sensor explains {db}", db=db_words(parts.residual)) + (
+        f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else ""
+    )
 
 
 def _run_up_words(held: Sequence[Row]) -> str:
@@ -139,16 +168,34 @@ def _run_up_words(held: Sequence[Row]) -> str:
         levels = [power_db(p.groups[name].mean_square) for _, p in rows if p.groups[name].verdict == "ok"]
         known = [level for level in levels if level is not None]
         if known:
-            said.append(f"{name} {min(known):.1f} to {max(known):.1f} dB, known at {len(known)} of {len(rows)} speeds")
+            said.append(
+                say(
+                    "{name} {known:.1f} to {known_2:.1f} dB, known at {n_known} of {n_rows} speeds",
+                    name=name,
+                    known=min(known),
+                    known_2=max(known),
+                    n_known=len(known),
+                    n_rows=len(rows),
+                )
+            )
     known_any = bool(said)
-    said = said or [f"no component's part is known at any of {len(rows)} speeds"]
+    said = said or [say("no component's part is known at any of {n_rows} speeds", n_rows=len(rows))]
     most = sum(p.residual > MOST * p.total and not paths_changed(p) for _, p in rows)
-    end = f"; most of the sound is explained by no sensor at {most} of them" if most else ""
+    end = say("; most of the sound is explained by no sensor at {most} of them", most=most) if most else ""
     differ = sum(paths_changed(p) for _, p in rows)
     if differ:
-        end += f"; what no sensor explains is not known at {differ}, for the paths differ from state to state"
-    ends = f" from {speeds[0].split()[0]} to {speeds[-1]}" if speeds else ""
-    return f"a run-up{ends}: {'of the whole sound ' if known_any else ''}{joined(said)}{end}."
+        end += say(
+            "; what no sensor explains is not known at {differ}, for the paths differ from state to state",
+            differ=differ,
+        )
+    ends = say(" from {split} to {speeds}", split=speeds[0].split()[0], speeds=speeds[-1]) if speeds else ""
+    return say(
+        "a run-up{ends}: {value}{said}{end}.",
+        ends=ends,
+        value=say("of the whole sound ") if known_any else "",
+        said=joined(said),
+        end=end,
+    )
 
 
 def agreement_words(analysis: Analysis, condition: str) -> str:
@@ -163,18 +210,22 @@ def agreement_words(analysis: Analysis, condition: str) -> str:
     if found is None:
         return ""
     quiet = "contribution" in found.agreement.silent
-    doubt = f"contributions: {found.contribution_words}" if quiet and found.contribution_words else ""
+    doubt = (
+        say("contributions: {contribution_words}", contribution_words=found.contribution_words)
+        if quiet and found.contribution_words
+        else ""
+    )
     if found.agreement.word == "silent":
         return f"{doubt[0].upper()}{doubt[1:]}." if doubt else ""
     by_source: dict[str, list[str]] = {}
     for kind, (source, _) in found.agreement.leads.items():
         by_source.setdefault(source, []).append(f"{kind}s")
-    said = [f"{joined(kinds)} say {source}" for source, kinds in by_source.items()]
+    said = [say("{kinds} say {source}", kinds=joined(kinds), source=source) for source, kinds in by_source.items()]
     silent = [f"{kind}s" for kind in found.agreement.silent if kind != "contribution"]
-    said += [f"{joined(silent)} name no source"] if silent else []
+    said += [say("{silent} name no source", silent=joined(silent))] if silent else []
     said += [doubt] if doubt else []
-    opening = {"agree": "The kinds of evidence agree", "disagree": "The kinds of evidence disagree"}
-    return f"{opening.get(found.agreement.word, 'One kind of evidence alone')}: {'; '.join(said)}."
+    opening = {"agree": say("The kinds of evidence agree"), "disagree": say("The kinds of evidence disagree")}
+    return f"{opening.get(found.agreement.word, say('One kind of evidence alone'))}: {'; '.join(said)}."
 
 
 # ---------------------------------------------------------------- tables
@@ -182,11 +233,11 @@ def agreement_words(analysis: Analysis, condition: str) -> str:
 
 def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row], name: str, title: str) -> Table:
     columns = [
-        Column("run", "Run"),
-        Column("speed", "Speed", align="right"),
-        Column("span", "Sound"),
-        Column("total_db", "Measured", "dB", 1, "number"),
-        Column("residual_db", "No sensor", "dB", 1, "number"),
+        Column("run", say("Run")),
+        Column("speed", say("Speed"), align="right"),
+        Column("span", say("Sound")),
+        Column("total_db", say("Measured"), "dB", 1, "number"),
+        Column("residual_db", say("No sensor"), "dB", 1, "number"),
         *(Column(f"{slug(component)}_db", component.capitalize(), "dB") for component in found.components),
     ]
     cells = [
@@ -200,7 +251,9 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
         ]
         for state, span, parts in rows
     ]
-    return Table(name, f"{title} (levels re 20 µPa, 95 %)", columns, cells, origin=analysis.campaign.origin)
+    return Table(
+        name, say("{title} (levels re 20 µPa, 95 %)", title=title), columns, cells, origin=analysis.campaign.origin
+    )
 
 
 def _cell(part: GroupPart) -> str:
@@ -208,11 +261,11 @@ def _cell(part: GroupPart) -> str:
     low, high = power_db(part.low), power_db(part.high)
     bound = "" if high is None else f"\N{LESS-THAN OR EQUAL TO} {high:.1f}"
     if part.verdict in ("refused", "below"):
-        return f"refused, {bound}" if part.verdict == "refused" else bound
-    reach = bound if low is None or high is None else f"{low:.1f} to {high:.1f}"
+        return say("refused, {bound}", bound=bound) if part.verdict == "refused" else bound
+    reach = bound if low is None or high is None else say("{low:.1f} to {high:.1f}", low=low, high=high)
     level = power_db(part.mean_square)
     said = "" if level is None else f"{level:.1f}"
-    return f"{said} flagged, {reach}" if part.verdict == "flagged" else f"{said} ({reach})"
+    return say("{said} flagged, {reach}", said=said, reach=reach) if part.verdict == "flagged" else f"{said} ({reach})"
 
 
 def _span_words(span: NamedSpan) -> str:
@@ -226,19 +279,21 @@ def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
         for name, part in parts.groups.items():
             if part.verdict in ("flagged", "refused") and span.kind != "band":
                 reason = part.reason.split(":")[0]
-                where.setdefault((name, part.verdict, reason), []).append(f"run {state.run} {_span_words(span)}")
+                where.setdefault((name, part.verdict, reason), []).append(
+                    say("run {run} {span}", run=state.run, span=_span_words(span))
+                )
     if not where:
         return []
     columns = (
-        Column("part", "Part"),
-        Column("verdict", "Verdict", kind="verdict"),
-        Column("reason", "Why"),
-        Column("count", "Times", "", 0, "number"),
-        Column("where", "Where"),
+        Column("part", say("Part")),
+        Column("verdict", say("Verdict"), kind="verdict"),
+        Column("reason", say("Why")),
+        Column("count", say("Times"), "", 0, "number"),
+        Column("where", say("Where")),
     )
     rows = [
         (name, verdict, reason, len(places), f"{', '.join(places[:4])}{', ...' if len(places) > 4 else ''}")
         for (name, verdict, reason), places in where.items()
     ]
-    table = Table(slug("contribution-reasons", receiver), "Why parts are flagged or refused", columns, rows)
-    return [Details(f"Why parts are flagged or refused, {len(rows)} reasons", [table])]
+    table = Table(slug("contribution-reasons", receiver), say("Why parts are flagged or refused"), columns, rows)
+    return [Details(say("Why parts are flagged or refused, {n_rows} reasons", n_rows=len(rows)), [table])]

@@ -19,6 +19,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, LineStyle, Rule
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, hertz
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
@@ -31,28 +32,28 @@ STYLES: Final[dict[str, LineStyle]] = {"one_way": "dashed", "two_way": "solid"}
 SMALLEST_DB: Final = 0.05
 """Changes that are none at the decimals shown."""
 
-METHOD = (
+METHOD = mark(
     "One-way coupling takes the bearing forces on seats that do not move and applies them to the housing. In two-way "
     "coupling the seats give way: the housing's modes enter the receptance that the mesh feels and the force that a "
     "bearing carries, and that force acts on the housing. All other numbers of this report are {used} ([model] "
     'coupling = "{key}").'
 )
-CURVES = (
+CURVES = mark(
     "Curves are for teeth in contact at the mean stiffness of the mesh, per µm of transmission error (amplitude): "
     "linear in it, so they hold for any."
 )
-BEYOND = (
+BEYOND = mark(
     "Beyond {highest}, up to which the housing's modes are computed, the sum of the same modes stands for it; shapes "
     "of the static correction, which are no resonances, are damped by a loss factor of {loss:g} [assumed]. For the "
     "reference drive in the reference housing, held against modes to 3 kHz, δ's peak to peak is within 0.6 % at nine "
     "of ten speeds and helix angles (2.3 % at most) and the bearing forces are within 0.15 dB (0.3 dB)."
 )
-DAMPING = (
+DAMPING = mark(
     "The housing's loss factor is structural in the balance. Multipliers and integration in time take it as viscous "
     "dampers that agree at each resonance (there, 0.06 % and 0.12 dB at most). With two-way coupling the largest "
     "multiplier is mostly that of a housing mode ringing down, so it lies closer to 1."
 )
-LEFT_OUT = (
+LEFT_OUT = mark(
     "A gear's bearings move as the mean of their two seats by the lever rule, so the tilt of a shaft is left out. The "
     "mass of shafts, the air and the torque that the housing takes up are left out as before. The mean forces do not "
     "change: what the soft springs of the housing give way to is no stiffness of the gears."
@@ -65,21 +66,24 @@ def coupling_section(result: FleetPrediction) -> Section | None:
     if coupling is None:
         return None
     differences = coupling.curves.differences(*_range(coupling))
-    beyond = BEYOND.format(highest=hertz(coupling.highest_hz), loss=CORRECTION_LOSS)
+    beyond = say(BEYOND).format(highest=hertz(coupling.highest_hz), loss=CORRECTION_LOSS)
     blocks: list[Block] = [
-        Paragraph(METHOD.format(used=WORDS[coupling.used], key=coupling.used)),
+        Paragraph(say(METHOD).format(used=WORDS[coupling.used], key=coupling.used)),
         Sentences(_said(coupling, differences)),
         FigureBlock(_receptance(coupling), "calculated"),
         *(FigureBlock(_differences(coupling, gear), "calculated") for gear in range(len(GEARS))),
         _by_direction(coupling, differences),
         _by_condition(coupling),
         Details(
-            "Bearing forces with either coupling",
-            [Paragraph(CURVES), *(FigureBlock(_forces(coupling, gear), "calculated") for gear in range(len(GEARS)))],
+            say("Bearing forces with either coupling"),
+            [
+                Paragraph(say(CURVES)),
+                *(FigureBlock(_forces(coupling, gear), "calculated") for gear in range(len(GEARS))),
+            ],
         ),
-        Sentences([beyond, DAMPING, LEFT_OUT]),
+        Sentences([beyond, say(DAMPING), say(LEFT_OUT)]),
     ]
-    return Section("coupling", "Gears and housing coupled both ways", blocks)
+    return Section("coupling", say("Gears and housing coupled both ways"), blocks)
 
 
 def _range(coupling: Coupling) -> tuple[float, float]:
@@ -100,14 +104,27 @@ def _said(coupling: Coupling, differences: tuple[ForceDifference, ...]) -> list[
     most = max(differences, key=lambda found: found.highest[0])
     medians = [found.median_db for found in differences]
     said = [
-        f"Between {hertz(low)} and {hertz(high)} the bearing forces with two-way coupling differ from the one-way ones "
-        f"by {_decibels(least.lowest[0])} (at {hertz(least.lowest[1])}, {least.gear} {least.direction}) to "
-        f"{_decibels(most.highest[0])} (at {hertz(most.highest[1])}, {most.gear} {most.direction}). At half of the "
-        f"frequencies they differ by more than {min(medians):.1f} to {max(medians):.1f} dB, depending on gear and "
-        "direction."
+        say(
+            "Between {hertz} and {hertz_2} the bearing forces with two-way coupling differ from the "
+            "one-way ones by {decibels} (at {hertz_3}, {gear} {direction}) to {decibels_2} (at "
+            "{hertz_4}, {gear_2} {direction_2}). At half of the frequencies they differ by more than "
+            "{medians:.1f} to {medians_2:.1f} dB, depending on gear and direction.",
+            hertz=hertz(low),
+            hertz_2=hertz(high),
+            decibels=_decibels(least.lowest[0]),
+            hertz_3=hertz(least.lowest[1]),
+            gear=least.gear,
+            direction=least.direction,
+            decibels_2=_decibels(most.highest[0]),
+            hertz_4=hertz(most.highest[1]),
+            gear_2=most.gear,
+            direction_2=most.direction,
+            medians=min(medians),
+            medians_2=max(medians),
+        )
     ]
-    said += [_change_words("The housing's own sound at 4 m", coupling, "structure_db")]
-    said += [_change_words("The total at 4 m", coupling, "total_db")]
+    said += [_change_words(say("The housing's own sound at 4 m"), coupling, "structure_db")]
+    said += [_change_words(say("The total at 4 m"), coupling, "total_db")]
     said += [_swing_words(coupling)]
     return [sentence for sentence in said if sentence]
 
@@ -119,13 +136,28 @@ def _change_words(what: str, coupling: Coupling, name: str) -> str:
         return ""
     (least, one), (most, other) = min(held, key=lambda p: p[0]), max(held, key=lambda p: p[0])
     if max(abs(least), abs(most)) < SMALLEST_DB:
-        where = f" in condition {one.condition}" if len(held) == 1 else ""
-        return f"{what} does not change{where} with two-way coupling (less than {SMALLEST_DB:g} dB)."
+        where = say(" in condition {condition}", condition=one.condition) if len(held) == 1 else ""
+        return say(
+            "{what} does not change{where} with two-way coupling (less than {smallest_db:g} dB).",
+            what=what,
+            where=where,
+            smallest_db=SMALLEST_DB,
+        )
     if len(held) == 1:
-        return f"{what} changes by {_decibels(least)} in condition {one.condition} with two-way coupling."
-    return (
-        f"{what} changes by {_decibels(least)} (condition {one.condition}) to {_decibels(most)} (condition "
-        f"{other.condition}) with two-way coupling."
+        return say(
+            "{what} changes by {decibels} in condition {condition} with two-way coupling.",
+            what=what,
+            decibels=_decibels(least),
+            condition=one.condition,
+        )
+    return say(
+        "{what} changes by {decibels} (condition {condition}) to {decibels_2} (condition "
+        "{condition_2}) with two-way coupling.",
+        what=what,
+        decibels=_decibels(least),
+        condition=one.condition,
+        decibels_2=_decibels(most),
+        condition_2=other.condition,
     )
 
 
@@ -136,12 +168,18 @@ def _swing_words(coupling: Coupling) -> str:
     if held:
         most, where = max(held, key=lambda pair: abs(pair[0]))
         text = pretty_signs(
-            f"The dynamic transmission error changes most in condition {where.condition}, by {100.0 * most:+.1f} %."
+            say(
+                "The dynamic transmission error changes most in condition {condition}, by {most:+.1f} %.",
+                condition=where.condition,
+                most=100.0 * most,
+            )
         )
     if missing:
-        text += (
-            f" In condition{'s' if len(missing) > 1 else ''} {joined(missing)} the balance finds no stable motion with "
-            "the other coupling, which is not integrated in time."
+        text += say(
+            " In condition{value} {missing} the balance finds no stable motion with the other "
+            "coupling, which is not integrated in time.",
+            value="s" if len(missing) > 1 else "",
+            missing=joined(missing),
         )
     return text.strip()
 
@@ -152,7 +190,7 @@ def _rules(coupling: Coupling) -> list[Element]:
 
 def _axis(coupling: Coupling) -> Axis:
     low, high = _range(coupling)
-    return Axis("Frequency", "Hz", limits=(0.6 * low, min(1.15 * high, coupling.highest_hz)))
+    return Axis(say("Frequency"), "Hz", limits=(0.6 * low, min(1.15 * high, coupling.highest_hz)))
 
 
 def _receptance(coupling: Coupling) -> Figure:
@@ -163,11 +201,14 @@ def _receptance(coupling: Coupling) -> Figure:
     ]
     return Figure(
         "coupling-receptance",
-        "What the mesh feels: displacement along the line of action per mesh force",
-        "Magnitude of the receptance of gears, bearings and (two-way) housing, without the mesh. Vertical lines: the "
-        "mesh frequencies of the conditions.",
+        say("What the mesh feels: displacement along the line of action per mesh force"),
+        say(
+            "Magnitude of the receptance of gears, bearings and (two-way) housing, without the mesh. Vertical "
+            "lines: the "
+            "mesh frequencies of the conditions."
+        ),
         _axis(coupling),
-        Axis("Receptance", "m/N", "log"),
+        Axis(say("Receptance"), "m/N", "log"),
         [*lines, *_rules(coupling)],
         height=360,
     )
@@ -181,11 +222,13 @@ def _differences(coupling: Coupling, gear: int) -> Figure:
     ]
     return Figure(
         f"coupling-{GEARS[gear]}",
-        f"Forces on the bearings of the {GEARS[gear]}: two-way less one-way",
-        "Teeth in contact at the mean stiffness of the mesh; above 0 the housing that gives way raises the force. "
-        "Vertical lines: the mesh frequencies of the conditions.",
+        say("Forces on the bearings of the {gears}: two-way less one-way", gears=GEARS[gear]),
+        say(
+            "Teeth in contact at the mean stiffness of the mesh; above 0 the housing that gives way raises the force. "
+            "Vertical lines: the mesh frequencies of the conditions."
+        ),
         _axis(coupling),
-        Axis("Difference", "dB"),
+        Axis(say("Difference"), "dB"),
         [*lines, *_rules(coupling)],
         height=360,
     )
@@ -206,10 +249,13 @@ def _forces(coupling: Coupling, gear: int) -> Figure:
     ]
     return Figure(
         f"coupling-forces-{GEARS[gear]}",
-        f"Forces on the bearings of the {GEARS[gear]} per µm of transmission error",
-        "Teeth in contact at the mean stiffness of the mesh. Vertical lines: the mesh frequencies of the conditions.",
+        say("Forces on the bearings of the {gears} per µm of transmission error", gears=GEARS[gear]),
+        say(
+            "Teeth in contact at the mean stiffness of the mesh. Vertical lines: the mesh frequencies of the "
+            "conditions."
+        ),
         _axis(coupling),
-        Axis("Force", "N/µm", "log"),
+        Axis(say("Force"), "N/µm", "log"),
         [*lines, *_rules(coupling)],
         height=380,
     )
@@ -221,29 +267,35 @@ def _by_direction(coupling: Coupling, differences: tuple[ForceDifference, ...]) 
     ]
     low, high = _range(coupling)
     columns = (
-        Column("gear", "Gear"),
-        Column("direction", "Direction"),
-        Column("median_db", "Median", "dB, magnitude", 1, "number"),
-        Column("lowest_db", "Lowest", "dB", 1, "number"),
+        Column("gear", say("Gear")),
+        Column("direction", say("Direction")),
+        Column("median_db", say("Median"), say("dB, magnitude"), 1, "number"),
+        Column("lowest_db", say("Lowest"), "dB", 1, "number"),
         Column("lowest_hz", "at", "Hz", 0, "number"),
-        Column("highest_db", "Highest", "dB", 1, "number"),
+        Column("highest_db", say("Highest"), "dB", 1, "number"),
         Column("highest_hz", "at", "Hz", 0, "number"),
     )
-    caption = f"Bearing forces, two-way less one-way, between {hertz(low)} and {hertz(high)}"
+    caption = say(
+        "Bearing forces, two-way less one-way, between {hertz} and {hertz_2}", hertz=hertz(low), hertz_2=hertz(high)
+    )
     return Table("coupling-directions", caption, columns, rows, origin="calculated")
 
 
 def _by_condition(coupling: Coupling) -> Table:
-    columns = [Column("condition", "Condition"), Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number")]
+    columns = [Column("condition", say("Condition")), Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number")]
     for key, title, unit, digits in (
-        ("dte_pp", "DTE", "µm", 2),
-        ("structure", "Structure", "dB", 1),
-        ("total", "Total", "dB", 1),
+        ("dte_pp", say("DTE"), "µm", 2),
+        ("structure", say("Structure"), "dB", 1),
+        ("total", say("Total"), "dB", 1),
     ):
         columns += [Column(f"{key}_{kind}", title, f"{unit}, {WORDS[kind]}", digits, "number") for kind in COUPLINGS]
     rows = [_condition_cells(held) for held in coupling.conditions]
     return Table(
-        "coupling-conditions", "The conditions with either coupling, levels at 4 m", columns, rows, origin="calculated"
+        "coupling-conditions",
+        say("The conditions with either coupling, levels at 4 m"),
+        columns,
+        rows,
+        origin="calculated",
     )
 
 

@@ -18,6 +18,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure, Markers
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.design_study_words import (
     left_out_words,
     level_words,
@@ -58,7 +59,7 @@ def design_study(result: FleetPrediction, study: SweepSensitivity, name: str) ->
         blocks.append(Notice("info", left_out))
     blocks.append(Paragraph(method_words(study)))
     ranges = _ranges(result, study, name)
-    blocks.append(ranges if len(ranges.rows) <= MOST_BARS else Details("Parameters and ranges", [ranges]))
+    blocks.append(ranges if len(ranges.rows) <= MOST_BARS else Details(say("Parameters and ranges"), [ranges]))
     said = study_words(result.fleet, study)
     if said:
         blocks.append(Sentences(said))
@@ -71,18 +72,18 @@ def design_study(result: FleetPrediction, study: SweepSensitivity, name: str) ->
     scatters = [FigureBlock(_scatter(result, study, level, place, name)) for place in study.ranking()[:MOST_SCATTERS]]
     blocks.append(scatters[0])
     if scatters[1:]:
-        blocks.append(Details("The level over the next parameters", scatters[1:]))
-    blocks.append(Details("Sensitivities by parameter and condition", [_table(result, study, name)]))
+        blocks.append(Details(say("The level over the next parameters"), scatters[1:]))
+    blocks.append(Details(say("Sensitivities by parameter and condition"), [_table(result, study, name)]))
     return blocks
 
 
 def _ranges(result: FleetPrediction, study: SweepSensitivity, name: str) -> Table:
     columns = (
-        Column("words", "Parameter"),
-        Column("from", "From", align="right"),
-        Column("to", "To", align="right"),
-        Column("spread", "Values"),
-        Column("parameter", "Key"),
+        Column("words", say("Parameter")),
+        Column("from", say("From"), align="right"),
+        Column("to", say("To"), align="right"),
+        Column("spread", say("Values")),
+        Column("parameter", say("Key")),
     )
     rows: list[list[Cell]] = []
     for key, held in zip(study.keys, study.found.sweep.ranges, strict=True):
@@ -90,10 +91,10 @@ def _ranges(result: FleetPrediction, study: SweepSensitivity, name: str) -> Tabl
         ends = [
             f"{value_words(key, end)}{unit if unit == '°' else f' {unit}'}".rstrip() for end in (held.low, held.high)
         ]
-        spread = "each ratio as likely" if held.scale == "log" else "each as likely"
-        whole = ", whole numbers alone" if key in study.found.whole else ""
+        spread = say("each ratio as likely") if held.scale == "log" else say("each as likely")
+        whole = say(", whole numbers alone") if key in study.found.whole else ""
         rows.append([number_words(key, result.fleet), *ends, f"{spread}{whole}", key])
-    return Table(f"{name}-ranges", "Parameters and ranges", columns, rows)
+    return Table(f"{name}-ranges", say("Parameters and ranges"), columns, rows)
 
 
 def _names(result: FleetPrediction, study: SweepSensitivity) -> tuple[list[int], list[str]]:
@@ -103,7 +104,7 @@ def _names(result: FleetPrediction, study: SweepSensitivity) -> tuple[list[int],
 
 def _some(study: SweepSensitivity) -> str:
     n = len(study.keys)
-    return f" The first {MOST_BARS} of {n} parameters are drawn." if n > MOST_BARS else ""
+    return say(" The first {most_bars} of {n} parameters are drawn.", most_bars=MOST_BARS, n=n) if n > MOST_BARS else ""
 
 
 def _bars(names: list[str], places: list[int], held: Estimate | None, name: str) -> Bars:
@@ -117,15 +118,20 @@ def _bars(names: list[str], places: list[int], held: Estimate | None, name: str)
 def _indices(result: FleetPrediction, study: SweepSensitivity, level: LevelInStudy, name: str) -> Figure:
     places, names = _names(result, study)
     bars = [
-        _bars(names, places, level.first_order, "on its own (first order)"),
-        _bars(names, places, level.total, "with interactions (total)"),
+        _bars(names, places, level.first_order, say("on its own (first order)")),
+        _bars(names, places, level.total, say("with interactions (total)")),
     ]
-    caption = (
-        f"Of the {level_words(level)} at {result.prediction.surface}; lines are intervals of 95 %. An index below 0 is "
-        f"one of 0 from too few points.{_some(study)}"
+    caption = say(
+        "Of the {level} at {surface}; lines are intervals of 95 %. An index below 0 is one of 0 "
+        "from too few points.{some}",
+        level=level_words(level),
+        surface=result.prediction.surface,
+        some=_some(study),
     )
-    title = "Part of the level's variance that each parameter makes"
-    return Figure(f"{name}-indices", title, caption, Axis("Parameter"), Axis("Part of the variance"), bars, height=460)
+    title = say("Part of the level's variance that each parameter makes")
+    return Figure(
+        f"{name}-indices", title, caption, Axis(say("Parameter")), Axis(say("Part of the variance")), bars, height=460
+    )
 
 
 def _by_condition(result: FleetPrediction, study: SweepSensitivity, name: str) -> Figure:
@@ -134,16 +140,34 @@ def _by_condition(result: FleetPrediction, study: SweepSensitivity, name: str) -
     shown = [*conditions[:MOST_LEVELS], *(level for level in study.levels if level.condition is None)]
     bars = [
         _bars(
-            names, places, level.weights, "energy mean" if level.condition is None else f"condition {level.condition}"
+            names,
+            places,
+            level.weights,
+            say("energy mean") if level.condition is None else say("condition {condition}", condition=level.condition),
         )
         for level in shown
     ]
     variance = any(level.total is not None for level in shown)
-    what = "Total index" if variance else "Standardised regression coefficient"
-    some = f" {MOST_LEVELS} of {len(conditions)} conditions are drawn." if len(conditions) > MOST_LEVELS else ""
-    caption = f"At {result.prediction.surface}; lines are intervals of 95 %.{some}{_some(study)}"
-    axes = Axis("Parameter"), Axis(what)
-    return Figure(f"{name}-conditions", f"{what} of each parameter by condition", caption, *axes, bars, height=460)
+    what = say("Total index") if variance else say("Standardised regression coefficient")
+    some = (
+        say(
+            " {most_levels} of {n_conditions} conditions are drawn.",
+            most_levels=MOST_LEVELS,
+            n_conditions=len(conditions),
+        )
+        if len(conditions) > MOST_LEVELS
+        else ""
+    )
+    caption = say(
+        "At {surface}; lines are intervals of 95 %.{some}{some_2}",
+        surface=result.prediction.surface,
+        some=some,
+        some_2=_some(study),
+    )
+    axes = Axis(say("Parameter")), Axis(what)
+    return Figure(
+        f"{name}-conditions", say("{what} of each parameter by condition", what=what), caption, *axes, bars, height=460
+    )
 
 
 def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStudy, place: int, name: str) -> Figure:
@@ -154,14 +178,22 @@ def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStu
     some = there[np.linspace(0, len(there) - 1, min(MOST_MARKS, len(there))).round().astype(int)]
     values = np.array([study.found.points[number][place][1] for number in some.tolist()], dtype=float)
     words = number_words(key, result.fleet)
-    drawn = f"{len(some)} of {len(there)} points" if len(some) < len(there) else f"{len(some)} points"
+    drawn = (
+        say("{n_some} of {n_there} points", n_some=len(some), n_there=len(there))
+        if len(some) < len(there)
+        else say("{n_some} points", n_some=len(some))
+    )
     return Figure(
         slug(name, "over", key),
-        f"Level over {words}",
-        f"{level_words(level).capitalize()} at {result.prediction.surface}, all other parameters anywhere in their "
-        f"ranges; {drawn}.",
+        say("Level over {words}", words=words),
+        say(
+            "{capitalize} at {surface}, all other parameters anywhere in their ranges; {drawn}.",
+            capitalize=level_words(level).capitalize(),
+            surface=result.prediction.surface,
+            drawn=drawn,
+        ),
         Axis(f"{words[:1].upper()}{words[1:]}", unit_of(key), held.scale),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         [Markers(values, level.level_db[some], level_words(level))],
     )
 
@@ -169,27 +201,31 @@ def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStu
 def _table(result: FleetPrediction, study: SweepSensitivity, name: str) -> Table:
     variance = study.found.sweep.sampling == "saltelli"
     titles = {
-        "slope": ("Over its range", "dB", 1),
-        "standardised": ("Standardised regression", "", 2),
-        "rank": ("Rank correlation", "", 2),
-        **({"first": ("First order", "", 2), "total": ("Total", "", 2)} if variance else {}),
+        "slope": (say("Over its range"), "dB", 1),
+        "standardised": (say("Standardised regression"), "", 2),
+        "rank": (say("Rank correlation"), "", 2),
+        **({"first": (say("First order"), "", 2), "total": (say("Total"), "", 2)} if variance else {}),
     }
-    columns = [Column("parameter", "Parameter"), Column("level", "Level")]
+    columns = [Column("parameter", say("Parameter")), Column("level", say("Level"))]
     for measure, (title, unit, digits) in titles.items():
-        for end, of in (("", ""), ("_low", ", from"), ("_high", ", to")):
+        for end, of in (("", ""), ("_low", say(", from")), ("_high", say(", to"))):
             columns.append(Column(f"{measure}{end}", f"{title}{of}", unit, digits, "number"))
-    columns.append(Column("explained", "R²", "", 2, "number"))
+    columns.append(Column("explained", say("R²"), "", 2, "number"))
     rows: list[list[Cell]] = []
     for place in study.ranking():
         words = number_words(study.keys[place], result.fleet)
         for level in study.levels:
-            told = "energy mean" if level.condition is None else f"condition {level.condition}"
+            told = (
+                say("energy mean")
+                if level.condition is None
+                else say("condition {condition}", condition=level.condition)
+            )
             held = level.regression
             of_line = (None, None, None) if held is None else (held.slope, held.standardised, held.rank)
             estimates = [*of_line, *((level.first_order, level.total) if variance else ())]
             cells = [cell for one in estimates for cell in _cells(one, place)]
             rows.append([words, told, *cells, None if held is None else held.explained])
-    caption = f"Sensitivities of the total at {result.prediction.surface}, with intervals of 95 %"
+    caption = say("Sensitivities of the total at {surface}, with intervals of 95 %", surface=result.prediction.surface)
     return Table(f"{name}-sensitivities", caption, columns, rows, origin="calculated")
 
 

@@ -19,6 +19,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Heatmap, Line
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.design_studies import design_study
 from tdacoustic.reporting.sections.parameters import value_words
 from tdacoustic.reporting.sections.words import joined, slug
@@ -40,13 +41,15 @@ def design_sweeps(result: FleetPrediction) -> Section | None:
     sweeps = result.studies.sweeps
     if not sweeps:
         return None
-    text = (
-        f"Each point is a prediction of its own with other values of the fleet's parameters; the level is the total at "
-        f"{result.prediction.surface}. A helix angle of the modelled pair changes the gears alone, as in the helix "
-        "sweep; a point whose housing differs has modes and transfer vectors of its own."
+    text = say(
+        "Each point is a prediction of its own with other values of the fleet's parameters; the "
+        "level is the total at {surface}. A helix angle of the modelled pair changes the gears "
+        "alone, as in the helix sweep; a point whose housing differs has modes and transfer "
+        "vectors of its own.",
+        surface=result.prediction.surface,
     )
     blocks: list[Block] = [Paragraph(text)]
-    return Section("design-sweeps", "Design sweeps", [*blocks, *(_of(result, sweep) for sweep in sweeps)])
+    return Section("design-sweeps", say("Design sweeps"), [*blocks, *(_of(result, sweep) for sweep in sweeps)])
 
 
 def _of(result: FleetPrediction, found: SweepResult) -> Section:
@@ -55,11 +58,21 @@ def _of(result: FleetPrediction, found: SweepResult) -> Section:
     blocks: list[Block] = []
     if refused:
         told = joined(list(dict.fromkeys(refused))[:3])
-        blocks.append(Notice("warning", f"{len(refused)} of {len(found.points)} points cannot be: {told}."))
+        blocks.append(
+            Notice(
+                "warning",
+                say(
+                    "{n_refused} of {n_points} points cannot be: {told}.",
+                    n_refused=len(refused),
+                    n_points=len(found.points),
+                    told=told,
+                ),
+            )
+        )
     study = next((one for one in result.studies.sweep_sensitivities if one.found is found), None)
     blocks += _over_grid(result, found, name) if study is None else design_study(result, study, name)
     table = _table(result, found, name)
-    blocks.append(table if len(table.rows) <= 12 else Details("Levels at each point", [table]))
+    blocks.append(table if len(table.rows) <= 12 else Details(say("Levels at each point"), [table]))
     return Section(name, found.sweep.name, blocks)
 
 
@@ -72,8 +85,8 @@ def _over_grid(result: FleetPrediction, found: SweepResult, name: str) -> list[B
             blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
         elif len(axes) == 2 and numeric and all(len(values) > 1 for values in axes):
             blocks += _maps(result, found, name)
-    told = joined([f"{_label(result, key)} is {key}" for key in keys])
-    return [*blocks, Paragraph(f"In the fleet file: {told}.")]
+    told = joined([say("{label} is {key}", label=_label(result, key), key=key) for key in keys])
+    return [*blocks, Paragraph(say("In the fleet file: {told}.", told=told))]
 
 
 def _label(result: FleetPrediction, key: str) -> str:
@@ -88,18 +101,22 @@ def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
     levels = found.of("spl_4m_db")[there]
     wide = x.min() > 0.0 and x.max() >= _WIDE * x.min()
     lines = [
-        Line(x, levels[:, place], f"condition {condition}", points=True)
+        Line(x, levels[:, place], say("condition {condition}", condition=condition), points=True)
         for place, condition in enumerate(found.conditions)
         if np.isfinite(levels[:, place]).any()
     ]
-    some = "" if len(lines) <= MOST_LINES else f"{MOST_LINES} of {len(lines)} conditions are drawn."
+    some = (
+        ""
+        if len(lines) <= MOST_LINES
+        else say("{most_lines} of {n_lines} conditions are drawn.", most_lines=MOST_LINES, n_lines=len(lines))
+    )
     label = _label(result, key)
     return Figure(
         name,
-        f"Total over {label[:1].lower()}{label[1:]}",
+        say("Total over {label}{label_2}", label=label[:1].lower(), label_2=label[1:]),
         some,
         Axis(label, unit_of(key), "log" if wide else "linear"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         lines[:MOST_LINES],
     )
 
@@ -116,22 +133,28 @@ def _maps(result: FleetPrediction, found: SweepResult, name: str) -> list[Block]
         if not np.isfinite(z).any():
             continue
         low, high = float(np.nanmin(z)), float(np.nanmax(z))
-        scale = Axis("Level", "dB", reference="20 µPa")
-        caption = f"The colours reach from {low:.1f} to {high:.1f} dB; each condition has a scale of its own."
+        scale = Axis(say("Level"), "dB", reference="20 µPa")
+        caption = say(
+            "The colours reach from {low:.1f} to {high:.1f} dB; each condition has a scale of its own.",
+            low=low,
+            high=high,
+        )
         x, y = (np.array(held, dtype=float)[of] for held, of in ((values_x, order_x), (values_y, order_y)))
-        heat = Heatmap(x, y, z, f"condition {condition}", scale)
-        title = f"Total in condition {condition} over both parameters"
+        heat = Heatmap(x, y, z, say("condition {condition}", condition=condition), scale)
+        title = say("Total in condition {condition} over both parameters", condition=condition)
         drawn = Figure(slug(name, condition), title, caption, axes[0], axes[1], [heat])
         figures.append(FigureBlock(drawn, "calculated"))
-    return [*figures[:1], *([Details("The other conditions", figures[1:])] if figures[1:] else [])]
+    return [*figures[:1], *([Details(say("The other conditions"), figures[1:])] if figures[1:] else [])]
 
 
 def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
     keys = found.sweep.keys
-    columns = [Column("point", "Point", "", 0, "number")]
+    columns = [Column("point", say("Point"), "", 0, "number")]
     columns += [Column(key.replace(".", "_"), _label(result, key), unit_of(key)) for key in keys]
-    columns += [Column(f"condition_{one}", f"Condition {one}", "dB", 1, "number") for one in found.conditions]
-    columns += [Column("reason", "Why not")] if any(found.reasons) else []
+    columns += [
+        Column(f"condition_{one}", say("Condition {one}", one=one), "dB", 1, "number") for one in found.conditions
+    ]
+    columns += [Column("reason", say("Why not"))] if any(found.reasons) else []
     levels = found.of("spl_4m_db")
     rows: list[list[Cell]] = []
     for number, (point, reason) in enumerate(zip(found.points[:MOST_ROWS], found.reasons, strict=False)):
@@ -139,6 +162,10 @@ def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
         shown = [None if math.isnan(level) else level for level in levels[number].tolist()]
         rows.append([number + 1, *values, *shown, *([reason] if any(found.reasons) else [])])
     n = len(found.points)
-    some = "" if n <= MOST_ROWS else f"; the first {MOST_ROWS} of {n} points, all are in sweeps.csv"
-    caption = f"Total at {result.prediction.surface} by point and condition{some}"
+    some = (
+        ""
+        if n <= MOST_ROWS
+        else say("; the first {most_rows} of {n} points, all are in sweeps.csv", most_rows=MOST_ROWS, n=n)
+    )
+    caption = say("Total at {surface} by point and condition{some}", surface=result.prediction.surface, some=some)
     return Table(f"{name}-points", caption, columns, rows, origin="calculated")

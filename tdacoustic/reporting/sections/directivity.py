@@ -26,6 +26,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
@@ -62,19 +63,21 @@ def directivity(result: FleetPrediction) -> Section | None:
     if speeds:
         said = _speed_words(result, speeds)
         blocks += [Sentences(said)] if said else []
-        blocks += _figures("directivity", "the conditions", speeds)
-        blocks.append(_table("directivity-conditions", "The level around the drive, by condition", "Condition", speeds))
-        blocks += _alike(result, "directivity-alike-conditions", "Condition", "speed", speeds)
+        blocks += _figures("directivity", say("the conditions"), speeds)
+        blocks.append(
+            _table("directivity-conditions", say("The level around the drive, by condition"), say("Condition"), speeds)
+        )
+        blocks += _alike(result, "directivity-alike-conditions", say("Condition"), "speed", speeds)
     if angles:
-        caption = "The level around the drive, by helix angle"
-        table = _table("directivity-helix-angles", caption, "Helix angle", angles)
+        caption = say("The level around the drive, by helix angle")
+        table = _table("directivity-helix-angles", caption, say("Helix angle"), angles)
         folded: list[Block] = [
-            *_figures("directivity-helix", "the helix angles, at the fastest condition", angles),
+            *_figures("directivity-helix", say("the helix angles, at the fastest condition"), angles),
             table,
-            *_alike(result, "directivity-alike-helix", "Helix angle", "helix", angles),
+            *_alike(result, "directivity-alike-helix", say("Helix angle"), "helix", angles),
         ]
-        blocks.append(Details("Directions over the helix angles", folded))
-    return Section("directivity", "Directions", blocks)
+        blocks.append(Details(say("Directions over the helix angles"), folded))
+    return Section("directivity", say("Directions"), blocks)
 
 
 def _node_planes(result: FleetPrediction) -> list[Notice]:
@@ -115,16 +118,24 @@ def _heard(result: FleetPrediction, sweep: str) -> list[tuple[Directivity, Patte
 def _method(result: FleetPrediction) -> str:
     radius_m = result.fleet.radiation.circle_radius_m.value
     added = [path.phrase for path in heard_paths(result.prediction.sound) if is_added(result.fleet, path)]
-    return (
-        f"Levels on a circle of {radius_m:g} m around the drive's centre in the plane z = 0, every 5°. 0° is the "
-        "direction of travel (x), 90° is to the left (y), 180° is behind, 270° is to the right. The levels are those "
-        f"of the total, which adds {joined(added)}."
+    return say(
+        "Levels on a circle of {radius_m:g} m around the drive's centre in the plane z = 0, "
+        "every 5°. 0° is the direction of travel (x), 90° is to the left (y), 180° is behind, "
+        "270° is to the right. The levels are those of the total, which adds {added}.",
+        radius_m=radius_m,
+        added=joined(added),
     )
 
 
 def _speed_words(result: FleetPrediction, speeds: list[Around]) -> list[str]:
     widest = max(speeds, key=lambda around: around.range_db)
-    found = [f"the directions differ most in condition {widest.name}, by {widest.range_db:.1f} dB"]
+    found = [
+        say(
+            "the directions differ most in condition {name}, by {range_db:.1f} dB",
+            name=widest.name,
+            range_db=widest.range_db,
+        )
+    ]
     found += [_beyond_words(result), _shape_words(result, speeds), judged_words(result, ("pattern", "loudest_deg"))]
     return [sentence(text) for text in found if text]
 
@@ -142,10 +153,14 @@ def _beyond_words(result: FleetPrediction) -> str:
             beyond.append(sound.condition)
     if not beyond:
         return ""
-    return (
-        f"all that the total adds in condition{'s' if len(beyond) > 1 else ''} {joined(beyond)} lies outside of the "
-        f"{low:.0f} to {high:.0f} Hz that the housing is computed for, so that the housing has no part in the "
-        "directions there"
+    return say(
+        "all that the total adds in condition{value} {beyond} lies outside of the {low:.0f} to "
+        "{high:.0f} Hz that the housing is computed for, so that the housing has no part in the "
+        "directions there",
+        value="s" if len(beyond) > 1 else "",
+        beyond=joined(beyond),
+        low=low,
+        high=high,
     )
 
 
@@ -156,28 +171,35 @@ def _shape_words(result: FleetPrediction, speeds: list[Around]) -> str:
     if not alike:
         return ""
     ends = list(dict.fromkeys(f"{value:.2f}" for value in (min(alike), max(alike))))
-    text = (
-        f"the shapes of the {len(shaped)} conditions with {SHAPED_DB:g} dB or more between directions correlate in "
-        f"pairs with {' to '.join(ends)} (1 is the same shape)"
+    text = say(
+        "the shapes of the {n_shaped} conditions with {shaped_db:g} dB or more between "
+        "directions correlate in pairs with {ends} (1 is the same shape)",
+        n_shaped=len(shaped),
+        shaped_db=SHAPED_DB,
+        ends=" to ".join(ends),
     )
     if is_of_the_paper(result.fleet):
-        text += f"; {PAPER} calls the shape invariant with speed"
+        text += say("; {paper} calls the shape invariant with speed", paper=say(PAPER))
     return pretty_signs(text)
 
 
 def _figures(name: str, of_what: str, held: Sequence[Around]) -> list[FigureBlock]:
     """The levels, and the same relative to the loudest direction of each."""
     shown = _spread(held)
-    some = "" if len(shown) == len(held) else f" {len(shown)} of {len(held)} are drawn."
+    some = (
+        ""
+        if len(shown) == len(held)
+        else say(" {n_shown} of {n_held} are drawn.", n_shown=len(shown), n_held=len(held))
+    )
     levels = [around.circle.level_db for around in shown]
-    axis = Axis("Sound pressure level", "dB", reference="20 µPa")
-    title = f"Level around the drive over the direction, {of_what}"
+    axis = Axis(say("Sound pressure level"), "dB", reference="20 µPa")
+    title = say("Level around the drive over the direction, {of_what}", of_what=of_what)
     found = [_figure(name, title, some.strip(), axis, shown, levels)]
     if len(shown) > 1 and any(around.range_db >= SHAPED_DB for around in shown):
         relative = [values - values.max() for values in levels]
-        axis = Axis("Level", "dB", reference="the loudest direction")
-        title = f"Shape of the level around the drive, {of_what}"
-        caption = f"Each relative to its own loudest direction.{some}"
+        axis = Axis(say("Level"), "dB", reference=say("the loudest direction"))
+        title = say("Shape of the level around the drive, {of_what}", of_what=of_what)
+        caption = say("Each relative to its own loudest direction.{some}", some=some)
         found.append(_figure(f"{name}-shape", title, caption, axis, shown, relative))
     return [FigureBlock(figure, "calculated") for figure in found]
 
@@ -201,17 +223,17 @@ def _figure(
         for around, values in zip(shown, levels, strict=True)
     ]
     elements += [Rule(angle, side) for angle, side in _SIDES]
-    return Figure(name, title, caption, Axis("Direction", "°", limits=(0.0, 360.0)), axis, elements, height=380)
+    return Figure(name, title, caption, Axis(say("Direction"), "°", limits=(0.0, 360.0)), axis, elements, height=380)
 
 
 def _table(name: str, caption: str, of: str, held: Sequence[Around]) -> Table:
     columns = (
         Column("of", of),
-        Column("loudest_db", "Loudest", "dB", 1, "number"),
+        Column("loudest_db", say("Loudest"), "dB", 1, "number"),
         Column("loudest_deg", "at", "°", 0, "number"),
-        Column("quietest_db", "Quietest", "dB", 1, "number"),
+        Column("quietest_db", say("Quietest"), "dB", 1, "number"),
         Column("quietest_deg", "at", "°", 0, "number"),
-        Column("range_db", "Range", "dB", 1, "number"),
+        Column("range_db", say("Range"), "dB", 1, "number"),
     )
     rows: list[list[Cell]] = []
     for around in held:
@@ -239,8 +261,9 @@ def _alike(result: FleetPrediction, name: str, of: str, sweep: str, held: Sequen
             pair = pairs.get((low, high))
             row.append(None if pair is None or math.isnan(pair.correlation) else pair.correlation)
         rows.append(row)
-    caption = (
-        "How alike the shapes are: correlation of each two over the directions, of levels in dB less their mean; "
-        f"shapes of less than {SHAPED_DB:g} dB say little"
+    caption = say(
+        "How alike the shapes are: correlation of each two over the directions, of levels in dB "
+        "less their mean; shapes of less than {shaped_db:g} dB say little",
+        shaped_db=SHAPED_DB,
     )
-    return [Details("Shapes in pairs", [Table(name, caption, columns, rows, origin="calculated")])]
+    return [Details(say("Shapes in pairs"), [Table(name, caption, columns, rows, origin="calculated")])]

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Final
 
 from tdacoustic.reporting.document import Alternatives, Block, Details, Table
+from tdacoustic.reporting.language import say
 
 __all__ = ["MOST_ROWS", "chosen", "in_sight"]
 
@@ -31,7 +32,11 @@ def in_sight(table: Table, what: str) -> Block:
     >>> in_sight(Table("many", "Many", columns, [["a"]] * 40), "Runs").summary
     'Runs, 40 rows'
     """
-    return table if len(table.rows) <= MOST_ROWS else Details(f"{what}, {len(table.rows)} rows", [table])
+    return (
+        table
+        if len(table.rows) <= MOST_ROWS
+        else Details(say("{what}, {n_rows} rows", what=what, n_rows=len(table.rows)), [table])
+    )
 
 
 def chosen(label: str, views: Sequence[tuple[str, Sequence[Block]]]) -> list[Block]:

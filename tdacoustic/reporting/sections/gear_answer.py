@@ -9,6 +9,7 @@ from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears.mesh_stiffness import LOW_LOAD_N_PER_M
 from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import (
     by_speed,
     conditions_words,
@@ -37,17 +38,17 @@ from tdacoustic.results import FleetPrediction
 
 __all__ = ["asked_lines", "gear_answer", "gear_overview", "regime_words"]
 
-SCOPE = (
+SCOPE = mark(
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
     "them, and the level around these as point sources; the housing is not."
 )
-SCOPE_WITH_HOUSING = (
+SCOPE_WITH_HOUSING = mark(
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
     "them, and the housing: what the bearing forces make it radiate, and how it scatters the sources beside it. The "
     "bearing forces are those of bearings in a housing that {moves}."
 )
 
-TERMS = (
+TERMS = mark(
     "DTE is the dynamic transmission error. Forces are the total of a gear's bearings, peak amplitudes of a line; x "
     "lies along the line of centres, y is tangential, z lies along the shafts."
 )
@@ -68,19 +69,19 @@ def asked_lines(result: FleetPrediction) -> list[str]:
 
 def gear_overview(result: FleetPrediction) -> Section:
     """Return the section on all conditions: `gear_answer` without the doubts, for a report that has them elsewhere."""
-    return Section("model-conditions", "The drive by condition", [*_said(result), _table(result)])
+    return Section("model-conditions", say("The drive by condition"), [*_said(result), _table(result)])
 
 
 def _said(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
-    moves = "gives way under them" if result.fleet.model.coupling.value == "two_way" else "does not move"
-    scope = SCOPE if result.prediction.housing is None else SCOPE_WITH_HOUSING.format(moves=moves)
+    moves = say("gives way under them") if result.fleet.model.coupling.value == "two_way" else say("does not move")
+    scope = say(SCOPE) if result.prediction.housing is None else say(SCOPE_WITH_HOUSING).format(moves=moves)
     blocks: list[Block] = [
         Paragraph(f"{regime_words(result)} {scope}"),
         Sentences([_of_condition(result.fleet, state, sound_words(result, state)) for state in states]),
     ]
     if any(state.masuda_db is not None for state in states):
-        blocks.append(Paragraph(f"{TERMS} {reading_words(result.fleet)}"))
+        blocks.append(Paragraph(f"{say(TERMS)} {reading_words(result.fleet)}"))
     over = [sentence(text) for text in _over_conditions(result) if text]
     return [*blocks, Sentences(over)] if over else blocks
 
@@ -90,13 +91,23 @@ def regime_words(result: FleetPrediction) -> str:
     fleet, states = result.fleet, result.prediction.conditions
     torques = [state.condition.torque_n_m for state in states]
     mode, low, high = fleet.operation.mode.value, min(torques), max(torques)
-    torque = torque_words(high) if low == high else f"{torque_words(low)} to {torque_words(high)}"
+    torque = (
+        torque_words(high)
+        if low == high
+        else say("{torque} to {torque_2}", torque=torque_words(low), torque_2=torque_words(high))
+    )
     if not low and not high:
-        text = f"Regime: {mode}, no torque, so that nothing presses the flanks of the teeth together."
+        text = say("Regime: {mode}, no torque, so that nothing presses the flanks of the teeth together.", mode=mode)
     else:
         powers = sorted(1e-3 * state.condition.power_w for state in states)
         ends = list(dict.fromkeys((significant(powers[0]), significant(powers[-1]))))
-        text = f"Regime: {mode}, {torque} of one motor, {_law_words(result)} ({' to '.join(ends)} kW). "
+        text = say(
+            "Regime: {mode}, {torque} of one motor, {law} ({ends} kW). ",
+            mode=mode,
+            torque=torque,
+            law=_law_words(result),
+            ends=" to ".join(ends),
+        )
         text += _sign_words(states)
     return f"{text} {_of_the_test(result)}".strip()
 
@@ -104,23 +115,37 @@ def regime_words(result: FleetPrediction) -> str:
 def _law_words(result: FleetPrediction) -> str:
     """How the torques follow from the speed, where it is the fleet's law that gives them."""
     fleet, conditions = result.fleet, [state.condition for state in result.prediction.conditions]
-    stated = "as the runs state it"
+    stated = say("as the runs state it")
     try:
         of_law = [torque_at(fleet, condition.train_speed_km_h) for condition in conditions]
     except FleetError:
         return stated
     held = [math.isclose(c.torque_n_m, law, rel_tol=1e-9) for c, law in zip(conditions, of_law, strict=True)]
-    return law_words(fleet) if all(held) else f"{law_words(fleet)} or {stated}" if any(held) else stated
+    return (
+        law_words(fleet)
+        if all(held)
+        else say("{law} or {stated}", law=law_words(fleet), stated=stated)
+        if any(held)
+        else stated
+    )
 
 
 def _sign_words(states: tuple[GearState, ...]) -> str:
     drive = [state for state in states if state.condition.torque_n_m > 0.0]
     coast = [state for state in states if state.condition.torque_n_m < 0.0]
-    up = "the motor drives the wheelset and the drive flanks carry"
-    down = "the wheelset drives the motor and the coast flanks carry"
+    up = say("the motor drives the wheelset and the drive flanks carry")
+    down = say("the wheelset drives the motor and the coast flanks carry")
     if not coast or not drive:
-        return f"{'Above' if drive else 'Below'} zero {up if drive else down}."
-    return sentence(f"in {conditions_words(drive)} {up}, in {conditions_words(coast)} {down}")
+        return say("{value} zero {up}.", value=say("Above") if drive else say("Below"), up=up if drive else down)
+    return sentence(
+        say(
+            "in {conditions} {up}, in {conditions_2} {down}",
+            conditions=conditions_words(drive),
+            up=up,
+            conditions_2=conditions_words(coast),
+            down=down,
+        )
+    )
 
 
 def _of_the_test(result: FleetPrediction) -> str:
@@ -128,35 +153,59 @@ def _of_the_test(result: FleetPrediction) -> str:
     if not is_of_the_paper(result.fleet):
         return ""
     unit, states = result.prediction.unit, result.prediction.conditions
-    text = (
-        f"In the test of the paper ({PAPER}, section 3.1) another locomotive hauled this one, so that the gears "
-        "carried drag only, on the coast flanks; how much is not printed."
+    text = say(
+        "In the test of the paper ({paper}, section 3.1) another locomotive hauled this one, so "
+        "that the gears carried drag only, on the coast flanks; how much is not printed.",
+        paper=say(PAPER),
     )
     loads = [unit.line_load_n_per_m(state.condition.torque_n_m) for state in states]
     if min(loads) >= LOW_LOAD_N_PER_M:
-        return f"{text} The load computed here is another regime than that of the test."
+        return say("{text} The load computed here is another regime than that of the test.", text=text)
     return text
 
 
 def _of_condition(fleet: Fleet, state: GearState, around: str) -> str:
     condition, steady = state.condition, state.steady
-    start = f"{state_words(state)}: mesh frequency {hertz(state.mesh_hz)}, {_torque(condition.torque_n_m)}"
+    start = say(
+        "{state}: mesh frequency {hertz}, {torque}",
+        state=state_words(state),
+        hertz=hertz(state.mesh_hz),
+        torque=_torque(condition.torque_n_m),
+    )
     if steady.method == "at_rest":
-        rest = "the teeth of the model do not touch, so there is no vibration, no force and no meshing noise"
+        rest = say("the teeth of the model do not touch, so there is no vibration, no force and no meshing noise")
         return sentence("; ".join(part for part in (start, rest, around) if part))
-    parts = [f"DTE {micrometres(steady.dte_pp_m)} peak to peak"]
+    parts = [say("DTE {micrometres} peak to peak", micrometres=micrometres(steady.dte_pp_m))]
     largest = largest_line(state)
     if largest is not None:
         gear, direction, force, frequency = largest
-        parts.append(f"largest bearing force {newtons(force)} at {hertz(frequency)} ({gear}, {direction})")
+        parts.append(
+            say(
+                "largest bearing force {newtons} at {hertz} ({gear}, {direction})",
+                newtons=newtons(force),
+                hertz=hertz(frequency),
+                gear=gear,
+                direction=direction,
+            )
+        )
     if state.masuda_db is not None:
-        parts.append(f"Masuda's level {state.masuda_db:.1f} {level_unit(fleet)} at 1 m")
+        parts.append(
+            say(
+                "Masuda's level {masuda_db:.1f} {level_unit} at 1 m",
+                masuda_db=state.masuda_db,
+                level_unit=level_unit(fleet),
+            )
+        )
     parts += [around] if around else []
     return sentence(f"{start}; {', '.join(parts)}. {sentence(motion_words(steady))}")
 
 
 def _torque(torque_n_m: float) -> str:
-    return f"torque {torque_words(torque_n_m)} ({flank_words(torque_n_m)})" if torque_n_m else "no torque"
+    return (
+        say("torque {torque} ({flank})", torque=torque_words(torque_n_m), flank=flank_words(torque_n_m))
+        if torque_n_m
+        else say("no torque")
+    )
 
 
 def _over_conditions(result: FleetPrediction) -> list[str]:
@@ -169,14 +218,14 @@ def _over_conditions(result: FleetPrediction) -> list[str]:
 
 def _table(result: FleetPrediction) -> Table:
     columns = (
-        Column("condition", "Condition"),
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("motor_speed_rpm", "Motor", "rpm", 1, "number"),
-        Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"),
-        Column("torque_n_m", "Torque", "N m", 0, "number"),
-        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
-        Column("largest_force_n", "Largest force", "N", 0, "number"),
-        Column("masuda_spl_1m_db", "Masuda, 1 m", level_unit(result.fleet), 1, "number"),
+        Column("condition", say("Condition")),
+        Column("train_speed_km_h", say("Speed"), "km/h", 1, "number"),
+        Column("motor_speed_rpm", say("Motor"), "rpm", 1, "number"),
+        Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
+        Column("torque_n_m", say("Torque"), "N m", 0, "number"),
+        Column("dte_pp_um", say("DTE"), say("µm, peak to peak"), 2, "number"),
+        Column("largest_force_n", say("Largest force"), "N", 0, "number"),
+        Column("masuda_spl_1m_db", say("Masuda, 1 m"), level_unit(result.fleet), 1, "number"),
     )
     rows: list[list[Cell]] = []
     for state in result.prediction.conditions:
@@ -193,4 +242,4 @@ def _table(result: FleetPrediction) -> Table:
                 state.masuda_db,
             ]
         )
-    return Table("conditions", "The conditions", columns, rows, origin="calculated")
+    return Table("conditions", say("The conditions"), columns, rows, origin="calculated")

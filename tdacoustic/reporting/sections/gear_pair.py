@@ -6,6 +6,7 @@ import math
 
 from tdacoustic.drive import GearState, GearUnit
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import by_speed, sentence
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import FleetPrediction
@@ -26,11 +27,11 @@ def gear_pair(result: FleetPrediction) -> Section:
     blocks: list[Block] = [Paragraph(_method(result)), _gears(unit), _pair(unit), _stiffness(unit)]
     if unit.stiffness.doubts:
         blocks.append(Sentences([sentence(doubt) for doubt in unit.stiffness.doubts]))
-    blocks += [Paragraph(MODES), _modes(result)]
-    return Section("gear-pair", "Gear pair", blocks)
+    blocks += [Paragraph(say(MODES)), _modes(result)]
+    return Section("gear-pair", say("Gear pair"), blocks)
 
 
-MODES = (
+MODES = mark(
     "Natural frequencies are those of the undamped linear system: two gears on their bearings, the teeth in contact, "
     "the mesh at its mean stiffness. A drive passes each of them at the speeds at which a mesh harmonic meets it. "
     "Where teeth separate, resonances move to lower frequencies. The first mode is the rigid rotation of the drive."
@@ -40,14 +41,20 @@ MODES = (
 def _method(result: FleetPrediction) -> str:
     unit, fleet = result.prediction.unit, result.fleet
     pair = fleet.modelled_pair
-    text = "Geometry by ISO 21771, without play in the centre distance, tips not shortened. "
+    text = say("Geometry by ISO 21771, without play in the centre distance, tips not shortened. ")
     if pair.helix_angle_deg is None:
-        text += "The helix angle follows from the centre distance. "
+        text += say("The helix angle follows from the centre distance. ")
     elif pair.centre_distance_mm is None:
-        text += "The centre distance follows from the helix angle. "
+        text += say("The centre distance follows from the helix angle. ")
     if len(fleet.gear_pair) > 1:
-        text += f"Of {len(fleet.gear_pair)} gear pairs in series, {unit.pair} is computed; "
-        text += f"its pinion turns {1.0 / unit.motor_turns:.4g} times a turn of the motor. "
+        text += say(
+            "Of {n_gear_pair} gear pairs in series, {pair} is computed; ",
+            n_gear_pair=len(fleet.gear_pair),
+            pair=unit.pair,
+        )
+        text += say(
+            "its pinion turns {motor_turns:.4g} times a turn of the motor. ", motor_turns=1.0 / unit.motor_turns
+        )
     return text.strip()
 
 
@@ -61,56 +68,62 @@ def _gears(unit: GearUnit) -> Table:
         return 1e3 * values_m[0], 1e3 * values_m[1]
 
     found: list[tuple[str, str, tuple[float, float]]] = [
-        ("Reference diameter", "mm", diameters(geometry.reference_radii_m)),
-        ("Base diameter", "mm", diameters(geometry.base_radii_m)),
-        ("Working pitch diameter", "mm", diameters(geometry.pitch_radii_m)),
-        ("Tip diameter", "mm", diameters(geometry.tip_radii_m)),
-        ("Root diameter", "mm", diameters(geometry.root_radii_m)),
-        ("Tooth thickness at the tip", "mm", lengths(geometry.tip_thicknesses_m)),
-        ("Clearance between tip and mating root", "mm", lengths(geometry.tip_clearances_m)),
+        (say("Reference diameter"), "mm", diameters(geometry.reference_radii_m)),
+        (say("Base diameter"), "mm", diameters(geometry.base_radii_m)),
+        (say("Working pitch diameter"), "mm", diameters(geometry.pitch_radii_m)),
+        (say("Tip diameter"), "mm", diameters(geometry.tip_radii_m)),
+        (say("Root diameter"), "mm", diameters(geometry.root_radii_m)),
+        (say("Tooth thickness at the tip"), "mm", lengths(geometry.tip_thicknesses_m)),
+        (say("Clearance between tip and mating root"), "mm", lengths(geometry.tip_clearances_m)),
     ]
     columns = (
-        Column("quantity", "Quantity"),
-        Column("unit", "Unit"),
-        Column("pinion", "Pinion", "", 3, "number"),
-        Column("wheel", "Wheel", "", 3, "number"),
+        Column("quantity", say("Quantity")),
+        Column("unit", say("Unit")),
+        Column("pinion", say("Pinion"), "", 3, "number"),
+        Column("wheel", say("Wheel"), "", 3, "number"),
     )
     rows: list[list[Cell]] = [[words, symbol, *pair] for words, symbol, pair in found]
     (z1, z2), (x1, x2) = geometry.teeth, geometry.profile_shift
-    caption = pretty_signs(f"The two gears: {z1} and {z2} teeth, profile shifts {x1:g} and {x2:g}")
+    caption = pretty_signs(
+        say("The two gears: {z1} and {z2} teeth, profile shifts {x1:g} and {x2:g}", z1=z1, z2=z2, x1=x1, x2=x2)
+    )
     return Table("gears", caption, columns, rows, origin="calculated")
 
 
 def _pair(unit: GearUnit) -> Table:
     geometry = unit.geometry
     rows: list[list[Cell]] = [
-        ["Gear ratio z2/z1", geometry.ratio, ""],
-        ["Centre distance", 1e3 * geometry.centre_distance_m, "mm"],
-        ["Helix angle at the reference circle", math.degrees(geometry.helix_angle_rad), "°"],
-        ["Helix angle at the base circle", math.degrees(geometry.base_helix_angle_rad), "°"],
-        ["Transverse pressure angle", math.degrees(geometry.transverse_pressure_angle_rad), "°"],
-        ["Working transverse pressure angle", math.degrees(geometry.working_pressure_angle_rad), "°"],
-        ["Transverse contact ratio", geometry.transverse_contact_ratio, ""],
-        ["Overlap ratio", geometry.overlap_ratio, ""],
-        ["Total contact ratio", geometry.contact_ratio, ""],
-        ["Face width", 1e3 * geometry.face_width_m, "mm"],
-        ["Transverse base pitch", 1e3 * geometry.base_pitch_m, "mm"],
+        [say("Gear ratio z2/z1"), geometry.ratio, ""],
+        [say("Centre distance"), 1e3 * geometry.centre_distance_m, "mm"],
+        [say("Helix angle at the reference circle"), math.degrees(geometry.helix_angle_rad), "°"],
+        [say("Helix angle at the base circle"), math.degrees(geometry.base_helix_angle_rad), "°"],
+        [say("Transverse pressure angle"), math.degrees(geometry.transverse_pressure_angle_rad), "°"],
+        [say("Working transverse pressure angle"), math.degrees(geometry.working_pressure_angle_rad), "°"],
+        [say("Transverse contact ratio"), geometry.transverse_contact_ratio, ""],
+        [say("Overlap ratio"), geometry.overlap_ratio, ""],
+        [say("Total contact ratio"), geometry.contact_ratio, ""],
+        [say("Face width"), 1e3 * geometry.face_width_m, "mm"],
+        [say("Transverse base pitch"), 1e3 * geometry.base_pitch_m, "mm"],
     ]
-    return _values("pair", "The pair", rows)
+    return _values("pair", say("The pair"), rows)
 
 
 def _stiffness(unit: GearUnit) -> Table:
     stiffness = unit.stiffness
     rows: list[list[Cell]] = [
-        ["c′, one pair of teeth, a unit of face width", 1e-9 * stiffness.single_n_per_m2, "N/(mm µm)"],
-        ["cγα, mean of the mesh, a unit of face width", 1e-9 * stiffness.mesh_n_per_m2, "N/(mm µm)"],
-        ["k̄, mean along the normal line of action, whole face width", 1e-6 * stiffness.normal_n_per_m, "N/µm"],
+        [say("c′, one pair of teeth, a unit of face width"), 1e-9 * stiffness.single_n_per_m2, "N/(mm µm)"],
+        [say("cγα, mean of the mesh, a unit of face width"), 1e-9 * stiffness.mesh_n_per_m2, "N/(mm µm)"],
+        [say("k̄, mean along the normal line of action, whole face width"), 1e-6 * stiffness.normal_n_per_m, "N/µm"],
     ]
-    return _values("stiffness", "Stiffness of the mesh by ISO 6336-1, method B, steel on steel", rows)
+    return _values("stiffness", say("Stiffness of the mesh by ISO 6336-1, method B, steel on steel"), rows)
 
 
 def _values(name: str, caption: str, rows: list[list[Cell]]) -> Table:
-    columns = (Column("quantity", "Quantity"), Column("value", "Value", "", 3, "number"), Column("unit", "Unit"))
+    columns = (
+        Column("quantity", say("Quantity")),
+        Column("value", say("Value"), "", 3, "number"),
+        Column("unit", say("Unit")),
+    )
     return Table(name, caption, columns, rows, origin="calculated")
 
 
@@ -122,17 +135,17 @@ def _modes(result: FleetPrediction) -> Table:
     rows: list[list[Cell]] = []
     for number, frequency in enumerate(frequencies.tolist(), 1):
         if frequency < AT_REST_HZ:
-            rows.append([str(number), 0.0, *(None for _ in HARMONICS), "rigid rotation"])
+            rows.append([str(number), 0.0, *(None for _ in HARMONICS), say("rigid rotation")])
             continue
         speeds = [frequency / harmonic * km_h_per_hz for harmonic in HARMONICS]
         rows.append([str(number), frequency, *speeds, _near(states, frequency)])
     columns = (
-        Column("mode", "Mode"),
-        Column("natural_frequency_hz", "Natural", "Hz", 1, "number"),
-        *(Column(f"mesh_{n}_km_h", f"Mesh x{n}", "meets it at km/h", 1, "number") for n in HARMONICS),
-        Column("conditions", f"Conditions within {100 * NEAR:.0f} %"),
+        Column("mode", say("Mode")),
+        Column("natural_frequency_hz", say("Natural"), "Hz", 1, "number"),
+        *(Column(f"mesh_{n}_km_h", say("Mesh x{n}", n=n), say("meets it at km/h"), 1, "number") for n in HARMONICS),
+        Column("conditions", say("Conditions within {near:.0f} %", near=100 * NEAR)),
     )
-    caption = "Natural frequencies, teeth in contact, bearing seats that do not move"
+    caption = say("Natural frequencies, teeth in contact, bearing seats that do not move")
     return Table("modes", caption, columns, rows, origin="calculated")
 
 

@@ -12,6 +12,7 @@ from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import DIRECTIONS, GEARS, SteadyState
 from tdacoustic.reporting.figure import Symbol
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.printed import FIGURE_11_CONDITION, is_of_the_paper, printed_of
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
@@ -45,10 +46,10 @@ DIRECTION_SYMBOLS: dict[str, Symbol] = {"x": "circle", "y": "diamond", "z": "squ
 MINUS = "\N{MINUS SIGN}"
 
 _LAWS = {
-    "constant": "constant over speed",
-    "constant_power": "from a constant power",
-    "running_resistance": "from the running resistance",
-    "table": "from the fleet's table over speed",
+    "constant": mark("constant over speed"),
+    "constant_power": mark("from a constant power"),
+    "running_resistance": mark("from the running resistance"),
+    "table": mark("from the fleet's table over speed"),
 }
 
 
@@ -61,7 +62,7 @@ def significant(value: float, digits: int = 3) -> str:
     ('1000', '0.0123', '0')
     """
     if value == 0.0 or not math.isfinite(value):
-        return "0" if value == 0.0 else "not determined"
+        return "0" if value == 0.0 else say("not determined")
     rounded = float(f"{value:.{digits - 1}e}")
     decimals = digits - 1 - math.floor(math.log10(abs(rounded)))
     text = f"{rounded:.{min(max(decimals, 0), 12)}f}"
@@ -107,13 +108,17 @@ def by_speed(states: Sequence[GearState]) -> list[GearState]:
 
 def state_words(state: GearState) -> str:
     """Return a condition's name with its speed."""
-    return f"condition {state.condition.name} ({state.condition.train_speed_km_h:.4g} km/h)"
+    return say(
+        "condition {name} ({train_speed_km_h:.4g} km/h)",
+        name=state.condition.name,
+        train_speed_km_h=state.condition.train_speed_km_h,
+    )
 
 
 def conditions_words(states: Sequence[GearState]) -> str:
     """Return several conditions by name."""
     names = joined([state.condition.name for state in states])
-    return f"condition{'s' if len(states) > 1 else ''} {names}"
+    return say("condition{value} {names}", value="s" if len(states) > 1 else "", names=names)
 
 
 def shown_state(result: FleetPrediction) -> GearState:
@@ -129,13 +134,13 @@ def shown_state(result: FleetPrediction) -> GearState:
 
 def law_words(fleet: Fleet) -> str:
     """Return how the torque follows from the speed."""
-    return _LAWS[fleet.operation.torque.value]
+    return say(_LAWS[fleet.operation.torque.value])
 
 
 def torque_words(torque_n_m: float) -> str:
     """Return a torque with its sign."""
     if not torque_n_m:
-        return "no torque"
+        return say("no torque")
     size = abs(torque_n_m)
     number = f"{size:.0f}" if size >= 1000.0 else f"{size:.4g}"
     return f"{'+' if torque_n_m > 0.0 else MINUS}{number} N m"
@@ -143,32 +148,38 @@ def torque_words(torque_n_m: float) -> str:
 
 def flank_words(torque_n_m: float) -> str:
     """Return which flanks of the teeth a torque presses together."""
-    return "no flanks" if not torque_n_m else "drive flanks" if torque_n_m > 0.0 else "coast flanks"
+    return say("no flanks") if not torque_n_m else say("drive flanks") if torque_n_m > 0.0 else say("coast flanks")
 
 
 def motion_words(steady: SteadyState) -> str:
     """Return how a motion was found and what it is."""
     if steady.method == "at_rest":
-        return "at rest: without torque the teeth of the model do not touch"
-    method = "harmonic balance" if steady.method == "harmonic_balance" else "time integration"
+        return say("at rest: without torque the teeth of the model do not touch")
+    method = say("harmonic balance") if steady.method == "harmonic_balance" else say("time integration")
     if steady.repeats_after is None:
-        repeats = "the motion does not repeat"
+        repeats = say("the motion does not repeat")
     elif steady.repeats_after == 1:
-        repeats = "periodic with the mesh"
+        repeats = say("periodic with the mesh")
     else:
-        repeats = f"the motion repeats only after {steady.repeats_after} mesh periods"
-    apart = f"teeth are apart {significant(100.0 * (1.0 - steady.contact_part), 2)} % of the time"
+        repeats = say("the motion repeats only after {repeats_after} mesh periods", repeats_after=steady.repeats_after)
+    apart = say(
+        "teeth are apart {significant} % of the time", significant=significant(100.0 * (1.0 - steady.contact_part), 2)
+    )
     return f"{method}: {repeats}, {apart if steady.separates else 'teeth stay in contact'}"
 
 
 def motion_cells(steady: SteadyState) -> tuple[str, str]:
     """Return what a motion is and how it was found, short enough for a table."""
     if steady.method == "at_rest":
-        return "at rest", ""
+        return say("at rest"), ""
     method = "balance" if steady.method == "harmonic_balance" else "integration"
     if steady.repeats_after is None:
-        return "does not repeat", method
-    return (f"every {steady.repeats_after} periods" if steady.repeats_after > 1 else "periodic"), method
+        return say("does not repeat"), method
+    return (
+        say("every {repeats_after} periods", repeats_after=steady.repeats_after)
+        if steady.repeats_after > 1
+        else "periodic"
+    ), method
 
 
 def largest_line(state: GearState) -> tuple[str, str, float, float] | None:

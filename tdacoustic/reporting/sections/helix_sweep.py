@@ -9,6 +9,7 @@ import numpy as np
 from tdacoustic.drive import HelixCase
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.gear_words import level_unit, micrometres, motion_cells
 from tdacoustic.reporting.sections.sound_paths import heard_paths, path_line
 from tdacoustic.results import FleetPrediction
@@ -29,16 +30,18 @@ def helix_sweep(result: FleetPrediction) -> Section | None:
         distances = np.array([1e3 * case.unit.geometry.centre_distance_m for case in cases])
         unit = level_unit(result.fleet)
         if dte.any():
-            axis = Axis("DTE", "µm", note="peak to peak")
-            blocks.append(_figure("helix-dte", "Dynamic transmission error over the helix angle", axis, angles, dte))
+            axis = Axis(say("DTE"), "µm", note=say("peak to peak"))
+            blocks.append(
+                _figure("helix-dte", say("Dynamic transmission error over the helix angle"), axis, angles, dte)
+            )
         if np.isfinite(levels).any():
-            axis = Axis("Level at 1 m", unit, reference="20 µPa")
-            blocks.append(_figure("helix-masuda", "Masuda's level over the helix angle", axis, angles, levels))
+            axis = Axis(say("Level at 1 m"), unit, reference="20 µPa")
+            blocks.append(_figure("helix-masuda", say("Masuda's level over the helix angle"), axis, angles, levels))
         around = _level_figure(result, cases, angles)
         blocks += [] if around is None else [FigureBlock(around, "calculated")]
-        axis = Axis("Centre distance", "mm")
-        blocks.append(_figure("helix-distance", "Centre distance over the helix angle", axis, angles, distances))
-    return Section("helix-sweep", "Helix sweep", blocks)
+        axis = Axis(say("Centre distance"), "mm")
+        blocks.append(_figure("helix-distance", say("Centre distance over the helix angle"), axis, angles, distances))
+    return Section("helix-sweep", say("Helix sweep"), blocks)
 
 
 def helix_words(result: FleetPrediction) -> str:
@@ -48,22 +51,31 @@ def helix_words(result: FleetPrediction) -> str:
         return ""
     least, most = (pick(cases, key=lambda case: case.gears.steady.dte_pp_m) for pick in (min, max))
     distances = [1e3 * case.unit.geometry.centre_distance_m for case in cases]
-    return (
-        f"helix angles {', '.join(f'{case.helix_angle_deg:g}°' for case in cases)}: the DTE is between "
-        f"{micrometres(least.gears.steady.dte_pp_m)} ({least.helix_angle_deg:g}°) and "
-        f"{micrometres(most.gears.steady.dte_pp_m)} ({most.helix_angle_deg:g}°), with the centre distance from "
-        f"{min(distances):.1f} to {max(distances):.1f} mm"
+    return say(
+        "helix angles {helix_angle_deg}: the DTE is between {micrometres} "
+        "({helix_angle_deg_2:g}°) and {micrometres_2} ({helix_angle_deg_3:g}°), with the centre "
+        "distance from {distances:.1f} to {distances_2:.1f} mm",
+        helix_angle_deg=", ".join(f"{case.helix_angle_deg:g}°" for case in cases),
+        micrometres=micrometres(least.gears.steady.dte_pp_m),
+        helix_angle_deg_2=least.helix_angle_deg,
+        micrometres_2=micrometres(most.gears.steady.dte_pp_m),
+        helix_angle_deg_3=most.helix_angle_deg,
+        distances=min(distances),
+        distances_2=max(distances),
     )
 
 
 def _method(result: FleetPrediction, case: HelixCase) -> str:
     condition = case.gears.condition
-    stays = "" if result.prediction.housing is None else "the housing and its seats, "
-    return (
-        f"At {condition.train_speed_km_h:.4g} km/h, the fastest condition. Rack, teeth, profile shifts and face width "
-        "stay; the centre distance, the contact ratios, the stiffness of the mesh and the working pressure angle "
-        f"follow from the helix angle. Masses, inertias, bearings, {stays}and the unloaded transmission error stay as "
-        "they are: that a longer contact line averages a real one more is left out."
+    stays = "" if result.prediction.housing is None else say("the housing and its seats, ")
+    return say(
+        "At {train_speed_km_h:.4g} km/h, the fastest condition. Rack, teeth, profile shifts and "
+        "face width stay; the centre distance, the contact ratios, the stiffness of the mesh and "
+        "the working pressure angle follow from the helix angle. Masses, inertias, bearings, "
+        "{stays}and the unloaded transmission error stay as they are: that a longer contact line "
+        "averages a real one more is left out.",
+        train_speed_km_h=condition.train_speed_km_h,
+        stays=stays,
     )
 
 
@@ -71,18 +83,18 @@ def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
     surface = result.prediction.surface
     with_structure = result.prediction.housing is not None
     columns = [
-        Column("helix_angle_deg", "Helix angle", "°", 1, "number"),
-        Column("centre_distance_mm", "Centres", "mm", 3, "number"),
+        Column("helix_angle_deg", say("Helix angle"), "°", 1, "number"),
+        Column("centre_distance_mm", say("Centres"), "mm", 3, "number"),
         Column("transverse_contact_ratio", "εα", "", 3, "number"),
         Column("overlap_ratio", "εβ", "", 3, "number"),
         Column("stiffness_n_per_um", "k̄", "N/µm", 0, "number"),
-        Column("dte_pp_um", "DTE p-p", "µm", 2, "number"),
-        Column("masuda_spl_1m_db", "Masuda", f"{level_unit(result.fleet)}, 1 m", 1, "number"),
-        Column("spl_db", "Total", f"dB, {surface}", 1, "number"),
-        Column("motion", "Motion"),
+        Column("dte_pp_um", say("DTE p-p"), "µm", 2, "number"),
+        Column("masuda_spl_1m_db", say("Masuda"), f"{level_unit(result.fleet)}, 1 m", 1, "number"),
+        Column("spl_db", say("Total"), f"dB, {surface}", 1, "number"),
+        Column("motion", say("Motion")),
     ]
     if with_structure:
-        columns.insert(7, Column("structure_spl_db", "Structure", f"dB, {surface}", 1, "number"))
+        columns.insert(7, Column("structure_spl_db", say("Structure"), f"dB, {surface}", 1, "number"))
     rows: list[list[Cell]] = [
         [
             case.helix_angle_deg,
@@ -98,7 +110,9 @@ def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
         ]
         for case in cases
     ]
-    caption = "Helix sweep: εα is the transverse contact ratio, εβ the overlap ratio, k̄ the mean stiffness of the mesh"
+    caption = say(
+        "Helix sweep: εα is the transverse contact ratio, εβ the overlap ratio, k̄ the mean stiffness of the mesh"
+    )
     return Table("helix", caption, columns, rows, origin="calculated")
 
 
@@ -116,10 +130,10 @@ def _level_figure(result: FleetPrediction, cases: list[HelixCase], angles: np.nd
         lines.insert(0, Line(angles, levels["total"], "total", color=7, points=True))
     return Figure(
         "helix-level",
-        f"Level at {surface} over the helix angle",
-        "Mean in energy over the surface. One dot a computed angle; the lines between them only lead the eye.",
-        Axis("Helix angle", "°"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        say("Level at {surface} over the helix angle", surface=surface),
+        say("Mean in energy over the surface. One dot a computed angle; the lines between them only lead the eye."),
+        Axis(say("Helix angle"), "°"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         lines,
         height=360,
     )
@@ -127,5 +141,7 @@ def _level_figure(result: FleetPrediction, cases: list[HelixCase], angles: np.nd
 
 def _figure(name: str, title: str, axis: Axis, angles: np.ndarray, values: np.ndarray) -> FigureBlock:
     line = Line(angles, values, axis.label, points=True)
-    caption = "One dot a computed angle; the lines between them only lead the eye."
-    return FigureBlock(Figure(name, title, caption, Axis("Helix angle", "°"), axis, [line], height=280), "calculated")
+    caption = say("One dot a computed angle; the lines between them only lead the eye.")
+    return FigureBlock(
+        Figure(name, title, caption, Axis(say("Helix angle"), "°"), axis, [line], height=280), "calculated"
+    )

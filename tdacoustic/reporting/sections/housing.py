@@ -10,6 +10,7 @@ from tdacoustic.drive import HousingFacts
 from tdacoustic.gears import GEARS
 from tdacoustic.reporting.document import Block, Details, Fact, Facts, FigureBlock, Paragraph, Section, Sentences
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.housing_parameters import HOUSING_SECTIONS, housing_named
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import joined, pretty_signs
@@ -20,36 +21,36 @@ __all__ = ["housing_section"]
 FIRST_MODES: Final = 10
 """Natural frequencies that are named one by one."""
 
-METHOD = (
+METHOD = mark(
     "The gears stand in a closed welded box of plates with four bearing seats, on soft springs at the seats and at a "
     "hanger. Its modes come from finite elements; the sound of each mode, and of point sources beside the rigid box, "
     "comes from boundary elements, once for all conditions, helix angles and loss factors."
 )
-FRAMES = (
+FRAMES = mark(
     "The gears' x points from the pinion to the wheel, their z to the right (−y of the drive), so that a positive "
     "torque is traction forward. In the drive's frame x is the direction of travel, y is to the left, z is up; 0, 0, 0 "
     "is the drive's centre."
 )
-TWO_WAY = (
+TWO_WAY = mark(
     "The coupling is two-way: the bearing seats give way under the gears, and the bearing forces are those on a "
     "housing that moves."
 )
-ONE_WAY = (
+ONE_WAY = mark(
     "The coupling is one-way: the bearing forces are those on a foundation that does not move, and the housing does "
     "not act back on the gears. Around 500 Hz panel, seat and bearing have impedances of one size, so a single "
     "direction of force, the axial one above all, may be off by several dB."
 )
-METHOD_STEP = (
+METHOD_STEP = mark(
     "The gears stand in the housing of a STEP file: one closed hollow solid of one material, on soft springs at its "
     "bearing seats and at a hanger. Its modes come from finite elements (curved tetrahedra of order 4); the sound of "
     "each mode, and of point sources beside the rigid housing, comes from boundary elements on flat panels over its "
     "outside, once for all conditions, helix angles and loss factors."
 )
-LEFT_OUT_STEP = (
+LEFT_OUT_STEP = mark(
     "Joints and screws of the housing are left out, and so are oil and gears in it and the air inside. The motor's "
     "body, wheels, bogie and car body neither radiate nor scatter."
 )
-LEFT_OUT = (
+LEFT_OUT = mark(
     "Ribs, flanges, bores and joints of the housing are left out, and so are oil and gears in it and the air inside. "
     "The motor's body, wheels, bogie and car body neither radiate nor scatter."
 )
@@ -61,13 +62,18 @@ def housing_section(result: FleetPrediction) -> Section | None:
     if housing is None:
         return None
     is_box = housing.step_file is None
-    blocks: list[Block] = [Paragraph(METHOD if is_box else METHOD_STEP), Facts(_facts(housing))]
+    blocks: list[Block] = [Paragraph(say(METHOD) if is_box else say(METHOD_STEP)), Facts(_facts(housing))]
     if len(housing.mode_hz):
         blocks.append(FigureBlock(_figure(result, housing), "calculated"))
-    words = [FRAMES, _split_words(housing), _coupling_words(result), LEFT_OUT if is_box else LEFT_OUT_STEP]
+    words = [
+        say(FRAMES),
+        _split_words(housing),
+        _coupling_words(result),
+        say(LEFT_OUT) if is_box else say(LEFT_OUT_STEP),
+    ]
     blocks.append(Sentences([*housing.notes, *words]))
     blocks.append(_parameters(result))
-    return Section("housing", "The housing", blocks)
+    return Section("housing", say("The housing"), blocks)
 
 
 def _facts(housing: HousingFacts) -> list[Fact]:
@@ -75,44 +81,57 @@ def _facts(housing: HousingFacts) -> list[Fact]:
     modes = housing.mode_hz
     below = int(np.count_nonzero(modes <= high))
     first = [f"{value:.1f}" for value in modes[:FIRST_MODES]]
-    facts = [] if housing.step_file is None else [Fact("From the STEP file", housing.step_file)]
+    facts = [] if housing.step_file is None else [Fact(say("From the STEP file"), housing.step_file)]
     facts += [
-        Fact("Mass", f"{housing.mass_kg:.0f} kg, of the finite elements"),
-        Fact("Frequency range", f"{low:.0f} to {high:.0f} Hz"),
+        Fact(say("Mass"), say("{mass_kg:.0f} kg, of the finite elements", mass_kg=housing.mass_kg)),
+        Fact(say("Frequency range"), say("{low:.0f} to {high:.0f} Hz", low=low, high=high)),
         Fact(
-            "Modes",
-            f"{below} with natural frequencies up to {high:.0f} Hz; kept are {len(modes)} and {housing.corrections} "
-            "shapes of a static correction, which stand for the modes beyond",
+            say("Modes"),
+            say(
+                "{below} with natural frequencies up to {high:.0f} Hz; kept are {n_modes} and "
+                "{corrections} shapes of a static correction, which stand for the modes beyond",
+                below=below,
+                high=high,
+                n_modes=len(modes),
+                corrections=housing.corrections,
+            ),
         ),
-        Fact("First natural frequencies", f"{', '.join(first)}{', ...' if len(modes) > FIRST_MODES else ''} Hz"),
-        Fact("Middle of the housing", _place(housing.position_m)),
-        Fact("Source of the meshing noise", _place(housing.mesh_m)),
+        Fact(say("First natural frequencies"), f"{', '.join(first)}{', ...' if len(modes) > FIRST_MODES else ''} Hz"),
+        Fact(say("Middle of the housing"), _place(housing.position_m)),
+        Fact(say("Source of the meshing noise"), _place(housing.mesh_m)),
     ]
     if housing.motor_m is not None:
-        facts.append(Fact("Sources of the motor", _place(housing.motor_m)))
+        facts.append(Fact(say("Sources of the motor"), _place(housing.motor_m)))
     return facts
 
 
 def _place(position_m: tuple[float, float, float]) -> str:
     x, y, z = (pretty_signs(f"{value:.4g}") for value in position_m)
-    return f"x {x}, y {y}, z {z} m in the drive's frame"
+    return say("x {x}, y {y}, z {z} m in the drive's frame", x=x, y=y, z=z)
 
 
 def _split_words(housing: HousingFacts) -> str:
     shares = [100.0 * share for share in housing.left_share]
     if abs(shares[0] - shares[1]) < 0.05:
-        of_left = f"{shares[0]:.3g} % of the force of either gear"
+        of_left = say("{shares:.3g} % of the force of either gear", shares=shares[0])
     else:
-        of_left = joined([f"{share:.3g} % of that of the {gear}" for share, gear in zip(shares, GEARS, strict=True)])
-    return (
-        f"A gear's bearing force, which the gear model has as a total, is split between its two bearings by the lever "
-        f"rule for where the gear stands on its shaft: the left bearing takes {of_left}, the right one the rest. So is "
-        "the axial force, which in truth one bearing may hold alone and which tilts it."
+        of_left = joined(
+            [
+                say("{share:.3g} % of that of the {gear}", share=share, gear=gear)
+                for share, gear in zip(shares, GEARS, strict=True)
+            ]
+        )
+    return say(
+        "A gear's bearing force, which the gear model has as a total, is split between its two "
+        "bearings by the lever rule for where the gear stands on its shaft: the left bearing "
+        "takes {of_left}, the right one the rest. So is the axial force, which in truth one "
+        "bearing may hold alone and which tilts it.",
+        of_left=of_left,
     )
 
 
 def _coupling_words(result: FleetPrediction) -> str:
-    return TWO_WAY if result.fleet.model.coupling.value == "two_way" else ONE_WAY
+    return say(TWO_WAY) if result.fleet.model.coupling.value == "two_way" else say(ONE_WAY)
 
 
 def _figure(result: FleetPrediction, housing: HousingFacts) -> Figure:
@@ -127,10 +146,10 @@ def _figure(result: FleetPrediction, housing: HousingFacts) -> Figure:
     ]
     return Figure(
         "housing-modes",
-        "Modes of the housing up to a frequency",
-        "Vertical lines: the mesh frequencies of the conditions.",
-        Axis("Frequency", "Hz", limits=(0.0, high)),
-        Axis("Number of modes"),
+        say("Modes of the housing up to a frequency"),
+        say("Vertical lines: the mesh frequencies of the conditions."),
+        Axis(say("Frequency"), "Hz", limits=(0.0, high)),
+        Axis(say("Number of modes")),
         elements,
         height=280,
     )
@@ -138,11 +157,18 @@ def _figure(result: FleetPrediction, housing: HousingFacts) -> Figure:
 
 def _parameters(result: FleetPrediction) -> Details:
     fleet = result.fleet
-    caption = f"Parameters of the housing and of the sound field, from the fleet file of {fleet.name}"
+    caption = say("Parameters of the housing and of the sound field, from the fleet file of {name}", name=fleet.name)
 
     def named(key: str) -> tuple[str, str] | None:
         return housing_named(fleet, key) if key.startswith(HOUSING_SECTIONS) else None
 
     table = parameter_table("housing-parameters", caption, fleet, named)
     assumed = [row[2] for row in table.rows].count("assumed")
-    return Details(f"{len(table.rows)} parameters of housing and sound field, {assumed} of them assumed", [table])
+    return Details(
+        say(
+            "{n_rows} parameters of housing and sound field, {assumed} of them assumed",
+            n_rows=len(table.rows),
+            assumed=assumed,
+        ),
+        [table],
+    )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from tdacoustic.fleet import Fleet
+from tdacoustic.reporting.language import say
 
 __all__ = ["HOUSING_SECTIONS", "housing_named"]
 
@@ -55,12 +56,14 @@ def housing_named(fleet: Fleet, key: str) -> tuple[str, str] | None:
     """Return words and unit of a parameter of housing or sound field that the model uses, None of another."""
     with_housing = fleet.radiation.method.value == "boundary_elements"
     if with_housing and key == "housing.position_m" and fleet.step_path is not None:
-        return "Housing: origin of its STEP file in the drive's frame, x, y, z", "m"
+        return say("Housing: origin of its STEP file in the drive's frame, x, y, z"), "m"
     if with_housing and key in _WITH_HOUSING:
         return _WITH_HOUSING[key]
     if with_housing and key.startswith("housing.seat.") and fleet.housing is not None:
         number, _, last = key.removeprefix("housing.seat.").partition(".")
         if last in _SEAT:
             words, unit = _SEAT[last]
-            return f"Seats of the {fleet.housing.seat[int(number) - 1].shaft}: {words}", unit
+            return say(
+                "Seats of the {shaft}: {words}", shaft=fleet.housing.seat[int(number) - 1].shaft, words=words
+            ), unit
     return _FIELD.get(key)

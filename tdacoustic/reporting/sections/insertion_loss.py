@@ -21,24 +21,25 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import hertz
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["insertion_loss_section"]
 
-METHOD: Final = (
+METHOD: Final = mark(
     "The insertion loss is the sound power level of a source in free field less the one that the housing radiates with "
     "the source inside; the latter from the mean over the surface at {surface}. The source is a point whose volume "
     "flow is held. It stands {place}. The air inside and the walls act on each other: modes of the air between rigid "
     "walls and the housing's modes (finite elements); boundary elements give the sound outside."
 )
-LEFT_OUT: Final = (
+LEFT_OUT: Final = mark(
     "The housing is closed: bearings, seals and vents let no sound through. Seats, gears, shafts and oil take no room, "
     "shafts and gears hang no mass on the seats, which matters at low frequencies (12 dB at 175 Hz for the reference "
     "drive, below 1 dB from 260 Hz on), and the air outside does not load the walls."
 )
-MASS_LAW: Final = (
+MASS_LAW: Final = mark(
     "The mass law is a reference, not a prediction: the transmission loss of limp walls for sound from all directions "
     "up to 78°. Stiff walls of a small box let less through at low frequencies; where the air inside or the walls "
     "resonate, and towards the coincidence of bending and sound waves, more goes through."
@@ -59,21 +60,25 @@ def insertion_loss_section(result: FleetPrediction) -> Section | None:
         return None
     fleet = result.fleet
     blocks: list[Block] = [
-        Paragraph(METHOD.format(surface=result.prediction.surface, place=_place_words(fleet, held))),
+        Paragraph(say(METHOD).format(surface=result.prediction.surface, place=_place_words(fleet, held))),
         Sentences([text for text in (_range_words(held), _of_air_words(held), _aside_words(held)) if text]),
         FigureBlock(_figure(held), "calculated"),
         _at_mesh(held),
-        Details("Third octaves", [_third_octaves(held)]),
-        Sentences([_placement_words(fleet, held), _air_words(held), MASS_LAW, LEFT_OUT]),
+        Details(say("Third octaves"), [_third_octaves(held)]),
+        Sentences([_placement_words(fleet, held), _air_words(held), say(MASS_LAW), say(LEFT_OUT)]),
     ]
-    return Section("insertion-loss", "Insertion loss of the housing", blocks)
+    return Section("insertion-loss", say("Insertion loss of the housing"), blocks)
 
 
 def _place_words(fleet: Fleet, held: InsertionLoss) -> str:
     x, y, z = (pretty_signs(f"{place:.3g}") for place in held.source_m)
-    where = f"at x = {x}, y = {y}, z = {z} m in the drive's frame"
+    where = say("at x = {x}, y = {y}, z = {z} m in the drive's frame", x=x, y=y, z=z)
     stated = fleet.masuda.placement.value == "inside" and fleet.masuda.position_m is not None
-    return f"{where} ([masuda] position_m)" if stated else f"at the pitch point between the shafts [assumed], {where}"
+    return (
+        say("{where} ([masuda] position_m)", where=where)
+        if stated
+        else say("at the pitch point between the shafts [assumed], {where}", where=where)
+    )
 
 
 def _known(held: InsertionLoss) -> list[MeshLoss]:
@@ -84,18 +89,30 @@ def _range_words(held: InsertionLoss) -> str:
     text = ""
     if held.band_db.size:
         low, high = int(np.argmin(held.band_db)), int(np.argmax(held.band_db))
-        text = (
-            f"In third octaves the housing takes {held.band_db[low]:.0f} dB (at {_nominal(held.band_hz[low])} Hz) to "
-            f"{held.band_db[high]:.0f} dB (at {_nominal(held.band_hz[high])} Hz)"
+        text = say(
+            "In third octaves the housing takes {band_db:.0f} dB (at {nominal} Hz) to "
+            "{band_db_2:.0f} dB (at {nominal_2} Hz)",
+            band_db=held.band_db[low],
+            nominal=_nominal(held.band_hz[low]),
+            band_db_2=held.band_db[high],
+            nominal_2=_nominal(held.band_hz[high]),
         )
     known = _known(held)
     if known:
-        parts = joined([f"{mesh.loss_db:.0f} dB in condition {mesh.condition}" for mesh in known])
-        text += f"{'; at' if text else 'At'} the mesh frequencies {parts}"
+        parts = joined(
+            [
+                say("{loss_db:.0f} dB in condition {condition}", loss_db=mesh.loss_db, condition=mesh.condition)
+                for mesh in known
+            ]
+        )
+        text += say("{value} the mesh frequencies {parts}", value=say("; at") if text else say("At"), parts=parts)
     beyond = [mesh.condition for mesh in held.at_mesh if mesh.loss_db is None]
     if beyond:
-        text += (
-            f"{'; of' if text else 'Of'} condition{'s' if len(beyond) > 1 else ''} {joined(beyond)} it is not computed"
+        text += say(
+            "{value} condition{value_2} {beyond} it is not computed",
+            value=say("; of") if text else say("Of"),
+            value_2="s" if len(beyond) > 1 else "",
+            beyond=joined(beyond),
         )
     return f"{text}."
 
@@ -106,13 +123,24 @@ def _of_air_words(held: InsertionLoss) -> str:
     if not pairs:
         return ""
     if not strong:
-        return (
+        return say(
             "From half to twice the loss factor of the air inside it changes by less than 5 dB at the mesh frequencies."
         )
-    parts = joined([f"from {pair[0]:.0f} to {pair[1]:.0f} dB in condition {mesh.condition}" for mesh, pair in strong])
-    return (
-        "Where the air inside resonates its loss factor decides: from half to twice its value the insertion loss goes "
-        f"{parts}."
+    parts = joined(
+        [
+            say(
+                "from {pair:.0f} to {pair_2:.0f} dB in condition {condition}",
+                pair=pair[0],
+                pair_2=pair[1],
+                condition=mesh.condition,
+            )
+            for mesh, pair in strong
+        ]
+    )
+    return say(
+        "Where the air inside resonates its loss factor decides: from half to twice its value "
+        "the insertion loss goes {parts}.",
+        parts=parts,
     )
 
 
@@ -121,37 +149,64 @@ def _aside_words(held: InsertionLoss) -> str:
     strong = [(mesh, pair) for mesh, pair in pairs if pair[1] - pair[0] > _SENSITIVE_DB]
     if not strong:
         return ""
-    parts = joined([f"{pair[0]:.0f} to {pair[1]:.0f} dB in condition {mesh.condition}" for mesh, pair in strong])
-    return (
-        f"The place of the source matters too: there and {1e3 * ASIDE_M:g} mm off along x, y or z it is {parts}. A "
-        "symmetric box with the source in its planes of symmetry answers with a part of its modes only."
+    parts = joined(
+        [
+            say(
+                "{pair:.0f} to {pair_2:.0f} dB in condition {condition}",
+                pair=pair[0],
+                pair_2=pair[1],
+                condition=mesh.condition,
+            )
+            for mesh, pair in strong
+        ]
+    )
+    return say(
+        "The place of the source matters too: there and {aside_m:g} mm off along x, y or z it is "
+        "{parts}. A symmetric box with the source in its planes of symmetry answers with a part "
+        "of its modes only.",
+        aside_m=1000.0 * ASIDE_M,
+        parts=parts,
     )
 
 
 def _placement_words(fleet: Fleet, held: InsertionLoss) -> str:
     losses = [mesh.loss_db for mesh in _known(held) if mesh.loss_db is not None]
-    span = f"{min(losses):.0f} to {max(losses):.0f} dB" if losses else "its insertion loss"
-    level = "Masuda's level is that of gear units measured with their housings"
+    span = (
+        say("{losses:.0f} to {losses_2:.0f} dB", losses=min(losses), losses_2=max(losses))
+        if losses
+        else say("its insertion loss")
+    )
+    level = say("Masuda's level is that of gear units measured with their housings")
     placement = fleet.masuda.placement.value
     if placement == "inside":
-        return (
-            f'[masuda] placement = "inside", as the paper has it: {level}, and here the housing takes {span} from it a '
-            'second time. With placement = "free" it would take nothing.'
+        return say(
+            '[masuda] placement = "inside", as the paper has it: {level}, and here the housing '
+            'takes {span} from it a second time. With placement = "free" it would take nothing.',
+            level=level,
+            span=span,
         )
     if placement == "off":
-        return f'[masuda] placement = "off": the meshing noise is no part of the total. {level}.'
-    return (
-        f'[masuda] placement = "free": {level}, so the source stands outside and keeps its power; none of this is '
-        f'taken from it. With placement = "inside", as the paper has it, the meshing noise would be lower by {span}.'
+        return say('[masuda] placement = "off": the meshing noise is no part of the total. {level}.', level=level)
+    return say(
+        '[masuda] placement = "free": {level}, so the source stands outside and keeps its power; '
+        'none of this is taken from it. With placement = "inside", as the paper has it, the '
+        "meshing noise would be lower by {span}.",
+        level=level,
+        span=span,
     )
 
 
 def _air_words(held: InsertionLoss) -> str:
     air = held.air
-    return (
-        f"The air inside has a loss factor of {air.loss_factor:g}, an absorption coefficient of {air.absorption:.2g} "
-        f"at {hertz(air.frequency_hz)}; viscosity and heat conduction at bare walls alone would give a loss factor of "
-        f"{air.bare_walls:.1g}. Gears, shafts, oil mist and leaks make the rest [assumed]."
+    return say(
+        "The air inside has a loss factor of {loss_factor:g}, an absorption coefficient of "
+        "{absorption:.2g} at {hertz}; viscosity and heat conduction at bare walls alone would "
+        "give a loss factor of {bare_walls:.1g}. Gears, shafts, oil mist and leaks make the rest "
+        "[assumed].",
+        loss_factor=air.loss_factor,
+        absorption=air.absorption,
+        hertz=hertz(air.frequency_hz),
+        bare_walls=air.bare_walls,
     )
 
 
@@ -164,30 +219,35 @@ def _nominal(frequency_hz: float) -> str:
 
 def _figure(held: InsertionLoss) -> Figure:
     known = _known(held)
-    elements: list[Element] = [Line(held.frequency_hz, held.loss_db, "insertion loss", color=0)]
+    elements: list[Element] = [Line(held.frequency_hz, held.loss_db, say("insertion loss"), color=0)]
     if held.band_hz.size:
-        elements.append(Line(*_steps(held), "its third octaves", color=0, width=2.5, opacity=0.55))
-    elements.append(Line(held.frequency_hz, held.mass_law_db, "mass law, field incidence", style="dashed", color=7))
+        elements.append(Line(*_steps(held), say("its third octaves"), color=0, width=2.5, opacity=0.55))
+    elements.append(
+        Line(held.frequency_hz, held.mass_law_db, say("mass law, field incidence"), style="dashed", color=7)
+    )
     if known:
         elements.append(
             Markers(
                 np.array([mesh.frequency_hz for mesh in known]),
                 np.array([mesh.loss_db for mesh in known]),
-                "at mesh frequencies",
+                say("at mesh frequencies"),
                 labels=[mesh.condition for mesh in known],
-                texts=[f"condition {mesh.condition}" for mesh in known],
+                texts=[say("condition {condition}", condition=mesh.condition) for mesh in known],
                 symbol="diamond",
                 color=1,
             )
         )
     return Figure(
         "insertion-loss",
-        "Insertion loss of the housing over frequency",
-        "Lines 1/48 octave apart; third octaves are means of the radiated energy of equally strong lines. Diamonds "
-        "with the names of the conditions stand at their mesh frequencies. The mass law is the transmission loss of "
-        "limp walls.",
-        Axis("Frequency", "Hz", "log"),
-        Axis("Insertion loss", "dB"),
+        say("Insertion loss of the housing over frequency"),
+        say(
+            "Lines 1/48 octave apart; third octaves are means of the radiated energy of equally strong lines. Diamonds "
+            "with the names of the conditions stand at their mesh frequencies. The mass law is the transmission "
+            "loss of "
+            "limp walls."
+        ),
+        Axis(say("Frequency"), "Hz", "log"),
+        Axis(say("Insertion loss"), "dB"),
         elements,
     )
 
@@ -200,13 +260,13 @@ def _steps(held: InsertionLoss) -> tuple[np.ndarray, np.ndarray]:
 
 def _at_mesh(held: InsertionLoss) -> Table:
     columns = [
-        Column("condition", "Condition"),
-        Column("frequency_hz", "Mesh frequency", "Hz", 1, "number"),
-        Column("insertion_loss_db", "Insertion loss", "dB", 1, "number"),
-        Column("mass_law_db", "Mass law", "dB", 1, "number"),
-        Column("half_air_loss_db", "Air η/2", "dB", 1, "number"),
-        Column("double_air_loss_db", "Air 2η", "dB", 1, "number"),
-        Column("beside_low_db", "Moved: least", "dB", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("frequency_hz", say("Mesh frequency"), "Hz", 1, "number"),
+        Column("insertion_loss_db", say("Insertion loss"), "dB", 1, "number"),
+        Column("mass_law_db", say("Mass law"), "dB", 1, "number"),
+        Column("half_air_loss_db", say("Air η/2"), "dB", 1, "number"),
+        Column("double_air_loss_db", say("Air 2η"), "dB", 1, "number"),
+        Column("beside_low_db", say("Moved: least"), "dB", 1, "number"),
         Column("beside_high_db", "most", "dB", 1, "number"),
     ]
     rows: list[Sequence[Cell]] = []
@@ -218,8 +278,8 @@ def _at_mesh(held: InsertionLoss) -> Table:
 
 def _third_octaves(held: InsertionLoss) -> Table:
     columns = (
-        Column("band_hz", "Third octave", "Hz", None, "number"),
-        Column("insertion_loss_db", "Insertion loss", "dB", 1, "number"),
+        Column("band_hz", say("Third octave"), "Hz", None, "number"),
+        Column("insertion_loss_db", say("Insertion loss"), "dB", 1, "number"),
     )
     rows = [(float(_nominal(band)), mean) for band, mean in zip(held.band_hz, held.band_db, strict=True)]
-    return Table("insertion-loss-bands", "Insertion loss in third octaves", columns, rows, origin="calculated")
+    return Table("insertion-loss-bands", say("Insertion loss in third octaves"), columns, rows, origin="calculated")

@@ -7,6 +7,7 @@ import re
 from tdacoustic.attribution import RunKinematics
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import Analysis
@@ -40,20 +41,20 @@ def kinematics(analysis: Analysis) -> Section | None:
     blocks: list[Block] = []
     held = [(run, analysis.kinematics[run.name]) for run in analysis.runs if run.name in analysis.kinematics]
     if held:
-        text = (
+        text = say(
             "The calculated mesh frequency follows from the stated speed, the wheel diameter and the teeth (from the "
             "measured speed where none is stated). The observed one is fitted to the lines of the gearbox's sensors; "
             "± is one standard deviation, and the excess is observed "
             "over calculated, minus one. Slip between wheel and rail is not part of the calculation."
         )
         origins = sorted({found.speed_source for _, found in held})
-        text += f" Orders refer to the motor speed from: {'; '.join(origins)}."
+        text += say(" Orders refer to the motor speed from: {origins}.", origins="; ".join(origins))
         blocks += [Paragraph(text), _table(analysis, held)]
         blocks.append(Sentences([_causes(run, found) for run, found in held]))
     else:
-        blocks.append(Paragraph("No steady run whose speed is known, so no order has a frequency."))
+        blocks.append(Paragraph(say("No steady run whose speed is known, so no order has a frequency.")))
     blocks.append(_parameters(analysis))
-    return Section("kinematics", "Speeds and mesh frequencies", blocks)
+    return Section("kinematics", say("Speeds and mesh frequencies"), blocks)
 
 
 def _is_measured(found: RunKinematics) -> bool:
@@ -64,16 +65,16 @@ def _table(analysis: Analysis, held: list[tuple[MeasuredRun, RunKinematics]]) ->
     one_source = len({found.speed_source for _, found in held}) == 1
     worn = any(run.run.wheel_diameter_mm is not None for run, _ in held)
     columns = [
-        Column("run", "Run"),
-        Column("train_speed_km_h", "Stated", "km/h", 1, "number"),
-        *([Column("wheel_diameter_mm", "Wheel", "mm", 1, "number")] if worn else []),
-        Column("motor_calculated_rpm", "Motor", "calculated, rpm", 1, "number"),
-        Column("motor_measured_rpm", "Motor", "measured, rpm", 1, "number"),
-        Column("mesh_calculated_hz", "Mesh", "calculated, Hz", 1, "number"),
-        Column("mesh_observed_hz", "Mesh", "observed, Hz", 1, "number"),
+        Column("run", say("Run")),
+        Column("train_speed_km_h", say("Stated"), "km/h", 1, "number"),
+        *([Column("wheel_diameter_mm", say("Wheel"), "mm", 1, "number")] if worn else []),
+        Column("motor_calculated_rpm", say("Motor"), say("calculated, rpm"), 1, "number"),
+        Column("motor_measured_rpm", say("Motor"), say("measured, rpm"), 1, "number"),
+        Column("mesh_calculated_hz", say("Mesh"), say("calculated, Hz"), 1, "number"),
+        Column("mesh_observed_hz", say("Mesh"), say("observed, Hz"), 1, "number"),
         Column("mesh_error_hz", "±", "1 σ, Hz", 2, "number"),
-        Column("excess_percent", "Excess", "%", 2, "number"),
-        *([] if one_source else [Column("speed_source", "Speed from")]),
+        Column("excess_percent", say("Excess"), "%", 2, "number"),
+        *([] if one_source else [Column("speed_source", say("Speed from"))]),
     ]
     rows = []
     for run, found in held:
@@ -90,18 +91,28 @@ def _table(analysis: Analysis, held: list[tuple[MeasuredRun, RunKinematics]]) ->
             "excess_percent": None if found.excess is None else 100.0 * found.excess,
         }
         rows.append([cells[column.key] for column in columns])
-    return Table("kinematics", "Speeds and mesh frequencies by run", columns, rows, origin=analysis.campaign.origin)
+    return Table(
+        "kinematics", say("Speeds and mesh frequencies by run"), columns, rows, origin=analysis.campaign.origin
+    )
 
 
 def _causes(run: MeasuredRun, found: RunKinematics) -> str:
     """One sentence: how far the observed mesh is off, and what that may come from."""
     if found.observed_mesh_hz is None or found.excess is None:
-        return f"Run {run.name}: {found.causes}; one was calculated at {found.mesh_hz:.1f} Hz."
+        return say(
+            "Run {name}: {causes}; one was calculated at {mesh_hz:.1f} Hz.",
+            name=run.name,
+            causes=found.causes,
+            mesh_hz=found.mesh_hz,
+        )
     off = pretty_signs(f"{100.0 * found.excess:+.2f} %")
-    seen = (
-        f"the mesh is observed at {found.observed_mesh_hz:.1f} Hz, {off} against the calculated {found.mesh_hz:.1f} Hz"
+    seen = say(
+        "the mesh is observed at {observed_mesh_hz:.1f} Hz, {off} against the calculated {mesh_hz:.1f} Hz",
+        observed_mesh_hz=found.observed_mesh_hz,
+        off=off,
+        mesh_hz=found.mesh_hz,
     )
-    return f"Run {run.name}: {seen}; {_rivals(found.causes)}."
+    return say("Run {name}: {seen}; {rivals}.", name=run.name, seen=seen, rivals=_rivals(found.causes))
 
 
 def _rivals(causes: str) -> str:
@@ -110,14 +121,14 @@ def _rivals(causes: str) -> str:
     if len(parts) == 1:
         return parts[0]
     measured = [part for part in parts if part.startswith("the measured speed")]
-    ruled_out = [f"it is {part}" for part in parts if part.startswith("not ")]
+    ruled_out = [say("it is {part}", part=part) for part in parts if part.startswith("not ")]
     rivals = [part for part in parts if not part.startswith(("the measured speed", "not "))]
-    return "; ".join([*measured, f"it may come from {', or '.join(rivals)}", *ruled_out])
+    return "; ".join([*measured, say("it may come from {rivals}", rivals=say(", or ").join(rivals)), *ruled_out])
 
 
 def _parameters(analysis: Analysis) -> Table:
     assert analysis.fleet is not None
-    title = f"What the kinematics rests on, from the fleet file of {analysis.fleet.name}"
+    title = say("What the kinematics rests on, from the fleet file of {name}", name=analysis.fleet.name)
     return parameter_table(
         "kinematics-parameters",
         title,
@@ -133,9 +144,9 @@ def _named(analysis: Analysis, key: str) -> tuple[str, str]:
     parts = key.split(".")
     if parts[0] == "gear_pair":
         pairs = analysis.fleet.gear_pair
-        which = f", gear pair {pairs[int(parts[1]) - 1].name}" if len(pairs) > 1 else ""
-        return f"Teeth of pinion and wheel{which}", ""
+        which = say(", gear pair {name}", name=pairs[int(parts[1]) - 1].name) if len(pairs) > 1 else ""
+        return say("Teeth of pinion and wheel{which}", which=which), ""
     assert analysis.fleet.motor is not None
     words, unit = _EXCITATION_WORDS[parts[-1]]
     name = analysis.fleet.motor.excitation[int(parts[2]) - 1].name
-    return f"Excitation {name}{', ' if words else ''}{words}", unit
+    return say("Excitation {name}{value}{words}", name=name, value=", " if words else "", words=words), unit

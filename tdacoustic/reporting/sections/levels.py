@@ -11,6 +11,7 @@ import numpy as np
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure, Line, Markers
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import measured_channels, pretty_unit, slug, tested_runs
 from tdacoustic.results import Analysis
 from tdacoustic.units import REFERENCES, level_db, reference_label
@@ -27,14 +28,19 @@ def levels(analysis: Analysis) -> Section:
     blocks.append(_table(analysis))
     blocks.append(
         Paragraph(
-            "The rms is of the whole record after its mean is removed; the level is that rms, corrected for background "
-            "where background runs exist, and so are the A-weighted level and that in the band, each by its own; rms "
-            "and third octaves are as measured. The A-weighted level applies the analytic curve of IEC 61672-1 to the "
-            "spectrum. The level in the band leaves out what lies outside the band given beside it."
+            say(
+                "The rms is of the whole record after its mean is removed; the level is that rms, corrected for "
+                "background "
+                "where background runs exist, and so are the A-weighted level and that in the band, each by its own; "
+                "rms "
+                "and third octaves are as measured. The A-weighted level applies the analytic curve of IEC 61672-1 "
+                "to the "
+                "spectrum. The level in the band leaves out what lies outside the band given beside it."
+            )
         )
     )
     blocks += _bands(analysis)
-    return Section("levels", "Levels", blocks)
+    return Section("levels", say("Levels"), blocks)
 
 
 def _overview(analysis: Analysis) -> Figure | None:
@@ -50,10 +56,10 @@ def _overview(analysis: Analysis) -> Figure | None:
         bars.append(Bars(runs, np.array([held["level_db"].get(run, np.nan) for run in runs]), name))
     return Figure(
         "sound-pressure-levels",
-        "Sound pressure level by run",
-        "Unweighted level of the whole run, corrected for background where that was recorded.",
-        Axis("Run"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        say("Sound pressure level by run"),
+        say("Unweighted level of the whole run, corrected for background where that was recorded."),
+        Axis(say("Run")),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         bars,
         height=320,
     )
@@ -64,31 +70,44 @@ def _table(analysis: Analysis) -> Table:
     with_background = bool(table["background_db"].notna().any())
     bands = {_band_words(row) for row in table.to_dict("records")} - {""}
     columns = [
-        Column("run", "Run"),
-        Column("channel", "Channel"),
-        Column("quantity", "Quantity"),
-        Column("rms", "rms", "SI", 4, "number"),
-        Column("si_unit", "Unit"),
-        Column("level_db", "Level", "dB", 1, "number"),
-        Column("laeq_db", "A-weighted", "dB(A)", 1, "number"),
-        Column("level_band_db", "In the band", "dB", 1, "number"),
+        Column("run", say("Run")),
+        Column("channel", say("Channel")),
+        Column("quantity", say("Quantity")),
+        Column("rms", "rms", say("SI"), 4, "number"),
+        Column("si_unit", say("Unit")),
+        Column("level_db", say("Level"), "dB", 1, "number"),
+        Column("laeq_db", say("A-weighted"), "dB(A)", 1, "number"),
+        Column("level_band_db", say("In the band"), "dB", 1, "number"),
     ]
     if len(bands) > 1:
-        columns.append(Column("band", "Band"))
+        columns.append(Column("band", say("Band")))
     if (table["calibration"] == "doubtful").any():
-        columns.append(Column("calibration", "Calibrators"))
+        columns.append(Column("calibration", say("Calibrators")))
     if with_background:
-        columns += [Column("background_db", "Background", "dB", 1, "number"), Column("correction", "Correction")]
+        columns += [
+            Column("background_db", say("Background"), "dB", 1, "number"),
+            Column("correction", say("Correction")),
+        ]
     rows = [[_cell(row, column) for column in columns] for row in table.to_dict("records")]
-    band = f"; the band is {next(iter(bands))}" if len(bands) == 1 else ""
-    references = "sound pressure re 20 µPa, acceleration re 1 µm/s²"
-    return Table("levels", f"Levels ({references}{band})", columns, rows, origin=analysis.campaign.origin)
+    band = say("; the band is {next}", next=next(iter(bands))) if len(bands) == 1 else ""
+    references = say("sound pressure re 20 µPa, acceleration re 1 µm/s²")
+    return Table(
+        "levels",
+        say("Levels ({references}{band})", references=references, band=band),
+        columns,
+        rows,
+        origin=analysis.campaign.origin,
+    )
 
 
 def _band_words(row: Mapping[Hashable, Any]) -> str:
     if math.isnan(row["level_band_from_hz"]):
         return ""
-    return f"{row['level_band_from_hz']:.4g} to {row['level_band_to_hz']:.5g} Hz"
+    return say(
+        "{level_band_from_hz:.4g} to {level_band_to_hz:.5g} Hz",
+        level_band_from_hz=row["level_band_from_hz"],
+        level_band_to_hz=row["level_band_to_hz"],
+    )
 
 
 def _cell(row: Mapping[Hashable, Any], column: Column) -> Any:
@@ -120,14 +139,14 @@ def _bands(analysis: Analysis) -> list[Block]:
             y = np.array([np.nan if level is None else level for level in found])
             slot = len([e for e in by_channel.get(channel.name, []) if isinstance(e, Line)]) % 8
             elements = by_channel.setdefault(channel.name, [])
-            elements.append(Line(x, y, f"run {run.name}", style="steps", color=slot))
+            elements.append(Line(x, y, say("run {name}", name=run.name), style="steps", color=slot))
             doubtful = [index for index, band in enumerate(result.bands) if band.filter_dependent]
             if doubtful:
                 elements.append(
                     Markers(
                         x[doubtful],
                         y[doubtful],
-                        f"run {run.name}: depends on the filter",
+                        say("run {name}: depends on the filter", name=run.name),
                         symbol="x",
                         color=slot,
                     )
@@ -141,20 +160,22 @@ def _bands(analysis: Analysis) -> list[Block]:
     far = [figures[name] for name in figures if quantities[name] != "sound_pressure"]
     blocks: list[Block] = [*near]
     if far:
-        blocks.append(Details(f"Third octaves of {len(far)} vibration channels", far))
-    return [Section("third-octaves", "Third octaves", blocks)] if blocks else []
+        blocks.append(Details(say("Third octaves of {n_far} vibration channels", n_far=len(far)), far))
+    return [Section("third-octaves", say("Third octaves"), blocks)] if blocks else []
 
 
 def _band_figure(name: str, quantity: str, elements: list[Line | Markers]) -> Figure:
-    label = "Sound pressure level" if quantity == "sound_pressure" else "Acceleration level"
+    label = say("Sound pressure level") if quantity == "sound_pressure" else say("Acceleration level")
     return Figure(
         slug("bands", name),
-        f"Third-octave levels, {name}",
-        "Class-1 filters (IEC 61260-1). A cross marks a band within three bands of a line that is more than 15 dB "
-        "stronger: its level depends on the skirts of the filter, and another analyser may show several dB more or "
-        "less.",
-        Axis("Frequency", "Hz", "log"),
-        Axis(label, "dB", reference=pretty_unit(reference_label(quantity) or ""), note="in third octaves"),
+        say("Third-octave levels, {name}", name=name),
+        say(
+            "Class-1 filters (IEC 61260-1). A cross marks a band within three bands of a line that is more than 15 dB "
+            "stronger: its level depends on the skirts of the filter, and another analyser may show several dB more or "
+            "less."
+        ),
+        Axis(say("Frequency"), "Hz", "log"),
+        Axis(label, "dB", reference=pretty_unit(reference_label(quantity) or ""), note=say("in third octaves")),
         elements,
         height=360,
     )

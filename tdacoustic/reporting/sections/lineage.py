@@ -11,6 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Paragraph, Section, Table, walk
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import LogInput
 from tdacoustic.steps.record import Record
@@ -76,17 +77,19 @@ def lineage_sections(
     lineage : dict of str to str
         Anchor by section id.
     """
-    files = {f"sha256:{file.sha256}": file for file in inputs}
+    files = {say("sha256:{sha256}", sha256=file.sha256): file for file in inputs}
     behind: list[Block] = []
     anchors: dict[str, str] = {}
     fed: dict[str, Records] = {id_: resting_on(records, steps) for id_, steps in FED_BY.items()}
     fed |= {id_: tuple(held) for id_, held in (of_model or {}).items()}
-    titles = {"summary": "Summary"} | {block.id: block.title for block in walk(sections) if isinstance(block, Section)}
+    titles = {"summary": say("Summary")} | {
+        block.id: block.title for block in walk(sections) if isinstance(block, Section)
+    }
     for id_, title in titles.items():
         if fed.get(id_):
             anchors[id_] = f"from-{id_}"
             behind.append(_lineage(id_, title, fed[id_], files))
-    return [Section("behind", "What stands behind each section", behind)] if behind else [], anchors
+    return [Section("behind", say("What stands behind each section"), behind)] if behind else [], anchors
 
 
 def resting_on(records: Records, steps: Iterable[str]) -> Records:
@@ -152,14 +155,18 @@ def _object_words(value: Mapping[str, Any]) -> str:
     fields = value.get("fields", value)
     if isinstance(fields, dict) and isinstance(fields.get("name"), str):
         return str(fields["name"])
-    return str(value.get("$type", "a table")).rsplit(":", 1)[-1]
+    return str(value.get("$type", say("a table"))).rsplit(":", 1)[-1]
 
 
 def _items_words(items: Sequence[Any]) -> str:
     if not items:
         return "none"
     shown = ", ".join(_shown(item) for item in items[:MOST_ITEMS])
-    return shown if len(items) <= MOST_ITEMS else f"{shown} and {len(items) - MOST_ITEMS} more"
+    return (
+        shown
+        if len(items) <= MOST_ITEMS
+        else say("{shown} and {most_items} more", shown=shown, most_items=len(items) - MOST_ITEMS)
+    )
 
 
 def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInput]) -> Section:
@@ -170,34 +177,50 @@ def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInpu
     for _, record in records:
         keys = [key for _, key in record.inputs]
         read |= dict.fromkeys(key for key in keys if key in files)
-        made_from = dict.fromkeys("the logs" if key in files else done.get(key, "other files") for key in keys)
-        step = f"{record.step}, version {record.version}"
+        made_from = dict.fromkeys(
+            say("the logs") if key in files else done.get(key, say("other files")) for key in keys
+        )
+        step = say("{step}, version {version}", step=record.step, version=record.version)
         alike.setdefault((record.title, step, ", ".join(made_from)), []).append(record.label)
         settings.setdefault((record.title, settings_words(record.settings)), []).append(record.label)
     columns = (
-        Column("title", "Step"),
-        Column("step", "Name and version"),
-        Column("label", "Of"),
-        Column("inputs", "Made from"),
+        Column("title", say("Step")),
+        Column("step", say("Name and version")),
+        Column("label", say("Of")),
+        Column("inputs", say("Made from")),
     )
     rows = [(step, name, _labels(labels), made_from) for (step, name, made_from), labels in alike.items()]
-    table = Table(f"lineage-{id_}", f"Steps behind “{title}”; their keys are in the table of steps.", columns, rows)
+    table = Table(
+        f"lineage-{id_}",
+        say("Steps behind “{title}”; their keys are in the table of steps.", title=title),
+        columns,
+        rows,
+    )
     told = [(f"{step}, {_labels(labels)}", words) for (step, words), labels in settings.items() if words]
-    folded = [Details(f"Settings of these steps, {len(told)} entries", [Facts(told)])] if told else []
+    folded = (
+        [Details(say("Settings of these steps, {n_told} entries", n_told=len(told)), [Facts(told)])] if told else []
+    )
     words = _files_words([files[key] for key in read])
-    return Section(f"from-{id_}", f"Behind “{title}”", [words, table, *folded])
+    return Section(f"from-{id_}", say("Behind “{title}”", title=title), [words, table, *folded])
 
 
 def _labels(labels: Sequence[str]) -> str:
     each = list(dict.fromkeys(labels))
     if len(each) <= MOST_LABELS:
         return ", ".join(each)
-    return f"{', '.join(each[: MOST_LABELS - 1])} and {len(each) - MOST_LABELS + 1} more"
+    return say(
+        "{each} and {most_labels} more",
+        each=", ".join(each[: MOST_LABELS - 1]),
+        most_labels=len(each) - MOST_LABELS + 1,
+    )
 
 
 def _files_words(files: Sequence[LogInput]) -> Paragraph:
     if not files:
-        return Paragraph("Computed from the campaign and the fleet without reading a log.")
-    named = [f"{file.written} (SHA-256 {file.sha256[:16]})" for file in files[:MOST_FILES]]
-    named += [f"{len(files) - MOST_FILES} more"] if len(files) > MOST_FILES else []
-    return Paragraph(f"Read from {joined(named)}; whole SHA-256 in the table of inputs.")
+        return Paragraph(say("Computed from the campaign and the fleet without reading a log."))
+    named = [
+        say("{written} (SHA-256 {sha256})", written=file.written, sha256=file.sha256[:16])
+        for file in files[:MOST_FILES]
+    ]
+    named += [say("{most_files} more", most_files=len(files) - MOST_FILES)] if len(files) > MOST_FILES else []
+    return Paragraph(say("Read from {named}; whole SHA-256 in the table of inputs.", named=joined(named)))

@@ -22,6 +22,7 @@ from tdacoustic.reporting.document import (
     SoundTrack,
     Table,
 )
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.played import can_encode, played_alike
 from tdacoustic.reporting.sections.folding import chosen
 from tdacoustic.reporting.sections.order_figures import order_words
@@ -52,8 +53,10 @@ OVER_ORDER: Final = 2.5
 STRIP_HZ: Final = (500.0, 5000.0)
 """Height of the strip at least, and without an order."""
 
-NO_ENCODER = "There are excerpts, but the installed libsndfile writes no MP3 (1.1 and later do): nothing can be played."
-HOW = (
+NO_ENCODER = mark(
+    "There are excerpts, but the installed libsndfile writes no MP3 (1.1 and later do): nothing can be played."
+)
+HOW = mark(
     "“As recorded” is what the microphone picked up. “alone” is the order by itself, so that the ear knows what to "
     "listen for. “off and on” is the recording with the order taken out every other second: what changes is the order. "
     "Changing from one to another keeps the place; a click in the picture goes there. The order is extracted by a "
@@ -68,12 +71,12 @@ def listening(analysis: Analysis) -> Section | None:
     if found is None or not found.sounds:
         return None
     if not can_encode():
-        return Section("listening", "To listen to", [Notice("info", NO_ENCODER)])
+        return Section("listening", say("To listen to"), [Notice("info", say(NO_ENCODER))])
     blocks: list[Block] = [*_whose(analysis, found)]
     raised = [_raised_db(sound) for sound in found.sounds]
     parts = [_parts(sound, by_db) for sound, by_db in zip(found.sounds, raised, strict=True)]
     if not any(np.any(samples) for part in parts for samples, _, _ in part):
-        return Section("listening", "To listen to", [Paragraph("All excerpts are silent.")])
+        return Section("listening", say("To listen to"), [Paragraph(say("All excerpts are silent."))])
     played = played_alike([item for part in parts for item in part], round(found.sounds[0].excerpt.sample_rate_hz))
     blocks.append(Paragraph(_gain_words(played.full_scale_db)))
     mp3 = iter(played.mp3)
@@ -82,31 +85,37 @@ def listening(analysis: Analysis) -> Section | None:
         for sound, by_db, part in zip(found.sounds, raised, parts, strict=True)
     ]
     views = [(sound.condition, [block]) for sound, block in zip(found.sounds, heard, strict=True)]
-    blocks += chosen("Condition", views) if len(heard) > IN_SIGHT else heard
-    how = "How to listen, how the orders were extracted, and why these seconds"
-    blocks.append(Details(how, [Paragraph(HOW), _table(analysis, found, raised)]))
+    blocks += chosen(say("Condition"), views) if len(heard) > IN_SIGHT else heard
+    how = say("How to listen, how the orders were extracted, and why these seconds")
+    blocks.append(Details(how, [Paragraph(say(HOW)), _table(analysis, found, raised)]))
     blocks += _left_out(found)
-    return Section("listening", "To listen to", blocks)
+    return Section("listening", say("To listen to"), blocks)
 
 
 def _whose(analysis: Analysis, found: Listening) -> list[Block]:
     """What is heard, and of whom."""
     if analysis.campaign.origin == "synthetic":
-        return [Notice("synthetic", "These sounds were made by a program. No microphone recorded them.")]
+        return [Notice("synthetic", say("These sounds were made by a program. No microphone recorded them."))]
     names = joined(sorted({sound.excerpt.channel for sound in found.sounds}))
-    text = (
-        f"These are recordings of {names}: who spoke near the microphone then is heard in them, wherever this report "
-        "goes. sound_excerpts = false under [analysis] of the campaign leaves them out."
+    text = say(
+        "These are recordings of {names}: who spoke near the microphone then is heard in them, "
+        "wherever this report goes. sound_excerpts = false under [analysis] of the campaign "
+        "leaves them out.",
+        names=names,
     )
     return [Notice("info", text)]
 
 
 def _gain_words(full_scale_db: float) -> str:
-    return (
-        f"All are played with one gain, so that loudness compares from condition to condition: full scale is a peak of "
-        f"{full_scale_db:.0f} dB re 20 µPa, and a sine of {full_scale_db - 3.0:.0f} dB would reach it. Set the volume "
-        "once, at the loudest, and leave it. In the pictures the order lies between the dashed lines; their colours "
-        f"span {SHOWN_DB:.0f} dB."
+    return say(
+        "All are played with one gain, so that loudness compares from condition to condition: "
+        "full scale is a peak of {full_scale_db:.0f} dB re 20 µPa, and a sine of "
+        "{full_scale_db_2:.0f} dB would reach it. Set the volume once, at the loudest, and leave "
+        "it. In the pictures the order lies between the dashed lines; their colours span "
+        "{shown_db:.0f} dB.",
+        full_scale_db=full_scale_db,
+        full_scale_db_2=full_scale_db - 3.0,
+        shown_db=SHOWN_DB,
     )
 
 
@@ -147,13 +156,27 @@ def _sound(analysis: Analysis, sound: ConditionSound, raised_db: float, mp3: Seq
     excerpt, marked = sound.excerpt, sound.marked
     name = "" if marked is None else marked.name
     level = _level(excerpt.rms)
-    tracks = [SoundTrack("As recorded", mp3[0], f"{level:.1f} dB re 20 µPa, up to {excerpt.highest_hz:.0f} Hz")]
+    tracks = [
+        SoundTrack(
+            say("As recorded"),
+            mp3[0],
+            say("{level:.1f} dB re 20 µPa, up to {highest_hz:.0f} Hz", level=level, highest_hz=excerpt.highest_hz),
+        )
+    ]
     if len(mp3) > 1 and excerpt.order is not None:
         own = _level(excerpt.order.rms)
-        by = f", played {raised_db:.0f} dB louder than the others" if raised_db else ", with the same gain"
-        tracks.append(SoundTrack(f"{name} alone", mp3[1], f"{own:.1f} dB re 20 µPa{by}"))
+        by = (
+            say(", played {raised_db:.0f} dB louder than the others", raised_db=raised_db)
+            if raised_db
+            else say(", with the same gain")
+        )
+        tracks.append(SoundTrack(say("{name} alone", name=name), mp3[1], f"{own:.1f} dB re 20 µPa{by}"))
         tracks.append(
-            SoundTrack(f"{name} off and on", mp3[2], f"as recorded, without it every other {SWITCHED_S:.0f} s")
+            SoundTrack(
+                say("{name} off and on", name=name),
+                mp3[2],
+                say("as recorded, without it every other {switched_s:.0f} s", switched_s=SWITCHED_S),
+            )
         )
     order = excerpt.order
     line = None if order is None else (order.times_s, order.frequency_hz)
@@ -188,38 +211,58 @@ def _caption(sound: ConditionSound) -> str:
     excerpt = sound.excerpt
     last = excerpt.first_s + excerpt.duration_s
     parts = [
-        f"Run {sound.run}, {excerpt.channel}, {excerpt.first_s:.2f} to {last:.2f} s.",
+        say(
+            "Run {run}, {channel}, {first_s:.2f} to {last:.2f} s.",
+            run=sound.run,
+            channel=excerpt.channel,
+            first_s=excerpt.first_s,
+            last=last,
+        ),
         _listen_for(sound),
     ]
     if excerpt.n_missing:
-        parts.append(f"{excerpt.n_missing} samples are missing in the log and are silent here.")
+        parts.append(
+            say("{n_missing} samples are missing in the log and are silent here.", n_missing=excerpt.n_missing)
+        )
     if sound.doubts:
-        parts.append(f"The checks say of this channel: {'; '.join(sound.doubts)}.")
+        parts.append(say("The checks say of this channel: {doubts}.", doubts="; ".join(sound.doubts)))
     return " ".join(parts)
 
 
 def _listen_for(sound: ConditionSound) -> str:
     marked, order = sound.marked, sound.excerpt.order
     if marked is None:
-        what = "no order was tracked in it" if sound.sweeps else "it has no noise line"
-        return f"Nothing is marked: {what}."
+        what = say("no order was tracked in it") if sound.sweeps else say("it has no noise line")
+        return say("Nothing is marked: {what}.", what=what)
     name = order_words(marked.name, marked.order) if marked.order is not None else marked.name
-    of = f", given to the {marked.source}" if marked.source else ", whose source is not known"
+    of = say(", given to the {source}", source=marked.source) if marked.source else say(", whose source is not known")
     if order is None:
-        return f"Listen for {name}{of}; it could not be extracted: {sound.excerpt.no_order}."
+        return say(
+            "Listen for {name}{of}; it could not be extracted: {no_order}.",
+            name=name,
+            of=of,
+            no_order=sound.excerpt.no_order,
+        )
     below = _level(sound.excerpt.rms) - _level(order.rms)
     low = float(np.nanmax(order.frequency_hz, initial=0.0)) < HEADPHONES_HZ
-    small = " Small loudspeakers do not play so low a tone: use headphones." if low else ""
-    return f"Listen for {name}{of}, {_hz_words(order)}: {below:.1f} dB below the whole sound.{small}"
+    small = say(" Small loudspeakers do not play so low a tone: use headphones.") if low else ""
+    return say(
+        "Listen for {name}{of}, {hz}: {below:.1f} dB below the whole sound.{small}",
+        name=name,
+        of=of,
+        hz=_hz_words(order),
+        below=below,
+        small=small,
+    )
 
 
 def _hz_words(order: ExtractedOrder) -> str:
     known = order.frequency_hz[np.isfinite(order.frequency_hz)]
     if not known.size:
-        return "frequency not known"
+        return say("frequency not known")
     if np.ptp(known) < 0.02 * known.mean():
         return f"{known.mean():.0f} Hz"
-    return f"{known[0]:.0f} to {known[-1]:.0f} Hz"
+    return say("{known:.0f} to {known_2:.0f} Hz", known=known[0], known_2=known[-1])
 
 
 def _level(rms: float) -> float:
@@ -244,7 +287,7 @@ def _table(analysis: Analysis, found: Listening, raised: Sequence[float]) -> Tab
                 excerpt.duration_s,
                 _level(excerpt.rms),
                 "" if marked is None else marked.name,
-                "" if marked is None else marked.source or "not known",
+                "" if marked is None else marked.source or say("not known"),
                 float(known.min()) if known.size else None,
                 float(known.max()) if known.size else None,
                 None if order is None else _level(order.rms),
@@ -255,23 +298,25 @@ def _table(analysis: Analysis, found: Listening, raised: Sequence[float]) -> Tab
             )
         )
     columns = (
-        Column("condition", "Condition"),
-        Column("run", "Run"),
-        Column("channel", "Microphone"),
-        Column("start_s", "From", "s", 2, "number"),
-        Column("length_s", "Length", "s", 2, "number"),
-        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
-        Column("order", "Order"),
-        Column("source", "Source"),
-        Column("lowest_hz", "From", "Hz", 1, "number"),
-        Column("highest_hz", "To", "Hz", 1, "number"),
-        Column("order_level_db", "Alone", "dB re 20 µPa", 1, "number"),
-        Column("line_level_db", "In the whole run", "dB re 20 µPa", 1, "number"),
-        Column("bandwidth_hz", "Filter", "± Hz", 1, "number"),
-        Column("raised_db", "Raised", "dB", 0, "number"),
-        Column("chosen", "Why this one"),
+        Column("condition", say("Condition")),
+        Column("run", say("Run")),
+        Column("channel", say("Microphone")),
+        Column("start_s", say("From"), "s", 2, "number"),
+        Column("length_s", say("Length"), "s", 2, "number"),
+        Column("level_db", say("Level"), "dB re 20 µPa", 1, "number"),
+        Column("order", say("Order")),
+        Column("source", say("Source")),
+        Column("lowest_hz", say("From"), "Hz", 1, "number"),
+        Column("highest_hz", say("To"), "Hz", 1, "number"),
+        Column("order_level_db", say("Alone"), "dB re 20 µPa", 1, "number"),
+        Column("line_level_db", say("In the whole run"), "dB re 20 µPa", 1, "number"),
+        Column("bandwidth_hz", say("Filter"), "± Hz", 1, "number"),
+        Column("raised_db", say("Raised"), "dB", 0, "number"),
+        Column("chosen", say("Why this one")),
     )
-    return Table("listening", "Excerpts and the orders marked in them", columns, rows, origin=analysis.campaign.origin)
+    return Table(
+        "listening", say("Excerpts and the orders marked in them"), columns, rows, origin=analysis.campaign.origin
+    )
 
 
 def _left_out(found: Listening) -> list[Block]:
@@ -280,6 +325,8 @@ def _left_out(found: Listening) -> list[Block]:
         reasons.setdefault(why, []).append(condition)
     if not reasons:
         return []
-    said = Sentences([f"Without an excerpt: {joined(names)} ({why})." for why, names in reasons.items()])
+    said = Sentences(
+        [say("Without an excerpt: {names} ({why}).", names=joined(names), why=why) for why, names in reasons.items()]
+    )
     many = len(found.left_out)
-    return [said] if many <= MOST_NAMED else [Details(f"{many} conditions without an excerpt", [said])]
+    return [said] if many <= MOST_NAMED else [Details(say("{many} conditions without an excerpt", many=many), [said])]

@@ -25,6 +25,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, first_harmonic_n, hertz, newtons, sentence
 from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.words import joined
@@ -37,11 +38,11 @@ FEWEST = 3
 """Speeds below which nothing can rise and then fall."""
 
 COURSES: Final = {
-    "flat": "stays the same",
-    "rises": "rises",
-    "falls": "falls",
-    "rises_then_falls": "rises, then falls",
-    None: "up and down",
+    "flat": mark("stays the same"),
+    "rises": mark("rises"),
+    "falls": mark("falls"),
+    "rises_then_falls": mark("rises, then falls"),
+    None: mark("up and down"),
 }
 """Shapes of `shape_of` in words."""
 
@@ -61,16 +62,18 @@ def loads_over_speed(result: FleetPrediction, loaded: Sequence[GearState]) -> Se
         *(figures if len(loaded) > 1 else ()),
         Sentences([sentence(text) for text in (largest_words(loaded), judged_words(result, ("_force_",))) if text]),
         _courses(loaded, first),
-        _table(loaded, first, "forces-first", "Amplitude of the first mesh harmonic"),
+        _table(loaded, first, "forces-first", say("Amplitude of the first mesh harmonic")),
         Details(
-            "Rms of all lines, and mean forces",
+            say("Rms of all lines, and mean forces"),
             [
-                _table(loaded, np.stack([s.forces.rms_n() for s in loaded], -1), "forces-rms", "Rms of all lines"),
-                _table(loaded, np.stack([s.forces.mean_n for s in loaded], -1), "forces-mean", "Mean forces, signed"),
+                _table(loaded, np.stack([s.forces.rms_n() for s in loaded], -1), "forces-rms", say("Rms of all lines")),
+                _table(
+                    loaded, np.stack([s.forces.mean_n for s in loaded], -1), "forces-mean", say("Mean forces, signed")
+                ),
             ],
         ),
     ]
-    return Section("forces-over-conditions", "Over the conditions", blocks)
+    return Section("forces-over-conditions", say("Over the conditions"), blocks)
 
 
 def _over_conditions(loaded: Sequence[GearState]) -> NDArray[np.float64]:
@@ -86,10 +89,10 @@ def _figure(loaded: Sequence[GearState], first: NDArray[np.float64], gear: int) 
     ]
     return Figure(
         f"forces-{GEARS[gear]}",
-        f"First mesh harmonic of the forces on the bearings of the {GEARS[gear]} over the conditions",
-        "One dot a condition; the lines between them only lead the eye.",
-        Axis("Mesh frequency", "Hz"),
-        Axis("Force", "N", "log", note="peak amplitude"),
+        say("First mesh harmonic of the forces on the bearings of the {gears} over the conditions", gears=GEARS[gear]),
+        say("One dot a condition; the lines between them only lead the eye."),
+        Axis(say("Mesh frequency"), "Hz"),
+        Axis(say("Force"), "N", "log", note=say("peak amplitude")),
         lines,
         height=360,
     )
@@ -99,14 +102,23 @@ def largest_words(loaded: Sequence[GearState]) -> str:
     """Say in how many conditions the y force is the largest, by gear, at the mesh frequency and in all lines."""
     first, whole = _y_is_largest(_over_conditions(loaded)), _y_is_largest(_rms(loaded))
     counts = [
-        joined([f"{count} of {len(loaded)} conditions ({gear})" for count, gear in zip(counted, GEARS, strict=True)])
+        joined(
+            [
+                say("{count} of {n_loaded} conditions ({gear})", count=count, n_loaded=len(loaded), gear=gear)
+                for count, gear in zip(counted, GEARS, strict=True)
+            ]
+        )
         for counted in (first, whole)
     ]
     if first == whole:
-        where = f"both at the mesh frequency and by the rms of all lines in {counts[0]}"
+        where = say("both at the mesh frequency and by the rms of all lines in {counts}", counts=counts[0])
     else:
-        where = f"at the mesh frequency in {counts[0]}, by the rms of all lines in {counts[1]}"
-    return f"the tangential force (y) is the largest of the three {where}"
+        where = say(
+            "at the mesh frequency in {counts}, by the rms of all lines in {counts_2}",
+            counts=counts[0],
+            counts_2=counts[1],
+        )
+    return say("the tangential force (y) is the largest of the three {where}", where=where)
 
 
 def _y_is_largest(values: NDArray[np.float64]) -> list[int]:
@@ -130,11 +142,11 @@ def rise_words(loaded: Sequence[GearState]) -> str:
         return ""
     there = [name for name, course in courses.items() if course == COURSES["rises_then_falls"]]
     others = [name for name in courses if name not in there]
-    where = f" at {joined(there)}" if others else " in every direction"
-    but = f", not at {joined(others)}" if there and others else ""
+    where = say(" at {there}", there=joined(there)) if others else say(" in every direction")
+    but = say(", not at {others}", others=joined(others)) if there and others else ""
     if not there:
-        return "no force at the mesh frequency rises, then falls over the speeds"
-    return f"the force at the mesh frequency rises, then falls over the speeds{where}{but}"
+        return say("no force at the mesh frequency rises, then falls over the speeds")
+    return say("the force at the mesh frequency rises, then falls over the speeds{where}{but}", where=where, but=but)
 
 
 def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[str, str]:
@@ -143,15 +155,18 @@ def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[s
     values = values[places]
     listed = ", ".join(newtons(value) for value in values)
     if mesh.size < FEWEST:
-        return "", f"{listed}: at least {FEWEST} speeds are needed"
+        return "", say("{listed}: at least {fewest} speeds are needed", listed=listed, fewest=FEWEST)
     with np.errstate(divide="ignore"):
         shape = shape_of(20.0 * np.log10(values), FLAT_DB)
-    start, top, end = (f"{newtons(values[at])} at {hertz(mesh[at])}" for at in (0, int(values.argmax()), -1))
+    start, top, end = (
+        say("{newtons} at {hertz}", newtons=newtons(values[at]), hertz=hertz(mesh[at]))
+        for at in (0, int(values.argmax()), -1)
+    )
     figures = {
-        "rises_then_falls": f"from {start} up to {top}, then down to {end}",
-        None: f"{listed}; largest {top}",
+        "rises_then_falls": say("from {start} up to {top}, then down to {end}", start=start, top=top, end=end),
+        None: say("{listed}; largest {top}", listed=listed, top=top),
     }
-    return COURSES[shape], figures.get(shape, f"from {start} to {end}")
+    return say(COURSES[shape]), figures.get(shape, say("from {start} to {end}", start=start, end=end))
 
 
 def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
@@ -161,12 +176,14 @@ def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
             course, figures = _course(loaded, first[gear, number])
             rows.append([name, direction, course, figures])
     columns = (
-        Column("gear", "Gear"),
-        Column("direction", "Direction"),
-        Column("course", "With speed"),
-        Column("figures", "Figures, conditions by rising mesh frequency"),
+        Column("gear", say("Gear")),
+        Column("direction", say("Direction")),
+        Column("course", say("With speed")),
+        Column("figures", say("Figures, conditions by rising mesh frequency")),
     )
-    caption = f"How the forces at the mesh frequency go with speed; {FLAT_DB:g} dB up or down count as level"
+    caption = say(
+        "How the forces at the mesh frequency go with speed; {flat_db:g} dB up or down count as level", flat_db=FLAT_DB
+    )
     return Table("force-courses", caption, columns, rows, origin="calculated")
 
 
@@ -176,7 +193,11 @@ def _table(loaded: Sequence[GearState], values: NDArray[np.float64], name: str, 
         for gear in GEARS
         for direction in DIRECTIONS
     ]
-    columns = [Column("condition", "Condition"), Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"), *forces]
+    columns = [
+        Column("condition", say("Condition")),
+        Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
+        *forces,
+    ]
     rows: list[list[Cell]] = [
         [state.condition.name, state.mesh_hz, *values[:, :, index].ravel().tolist()]
         for index, state in enumerate(loaded)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Facts, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import pretty_unit, speed_words
 from tdacoustic.results import Analysis
 
@@ -21,13 +22,13 @@ def measured(analysis: Analysis) -> Section:
         blocks.append(_channels(analysis))
     if analysis.campaign.levels:
         blocks.append(_known_levels(analysis))
-    return Section("measured", "What was measured", blocks)
+    return Section("measured", say("What was measured"), blocks)
 
 
 def _runs(analysis: Analysis) -> Table:
     rows = []
     for run in analysis.runs:
-        state = "left out"
+        state = say("left out")
         if run.measurement is not None:
             state = "steady" if run.measurement.steady else "run-up"
         duration = max((c.duration_s for c in run.recording.channels), default=None) if run.recording else None
@@ -44,16 +45,16 @@ def _runs(analysis: Analysis) -> Table:
             )
         )
     columns = (
-        Column("run", "Run"),
-        Column("condition", "Condition"),
-        Column("kind", "Kind"),
-        Column("mode", "Mode"),
-        Column("speed", "Speed"),
-        Column("duration_s", "Length", "s", 2, "number"),
-        Column("state", "State"),
-        Column("logs", "Logs"),
+        Column("run", say("Run")),
+        Column("condition", say("Condition")),
+        Column("kind", say("Kind")),
+        Column("mode", say("Mode")),
+        Column("speed", say("Speed")),
+        Column("duration_s", say("Length"), "s", 2, "number"),
+        Column("state", say("State")),
+        Column("logs", say("Logs")),
     )
-    return Table("runs", "Runs", columns, rows)
+    return Table("runs", say("Runs"), columns, rows)
 
 
 def _channels(analysis: Analysis) -> Table:
@@ -77,20 +78,20 @@ def _channels(analysis: Analysis) -> Table:
                 used.sample_rate_hz if used else None,
                 pretty_unit(used.si_symbol) if used else "",
                 analysis.sensors.scale_from(stated),
-                " | ".join(scalings.get(stated.name, [pretty_unit(used.scaling)])) if used else "not used",
+                " | ".join(scalings.get(stated.name, [pretty_unit(used.scaling)])) if used else say("not used"),
             )
         )
     columns = (
-        Column("channel", "Channel"),
-        Column("quantity", "Quantity"),
-        Column("place", "Place"),
-        Column("distance_m", "Distance", "m", None, "number"),
-        Column("sample_rate_hz", "Rate", "Hz", None, "number"),
-        Column("unit", "SI unit"),
-        Column("scale_from", "Scale from"),
-        Column("scaling", "Conversion of the log's numbers"),
+        Column("channel", say("Channel")),
+        Column("quantity", say("Quantity")),
+        Column("place", say("Place")),
+        Column("distance_m", say("Distance"), "m", None, "number"),
+        Column("sample_rate_hz", say("Rate"), "Hz", None, "number"),
+        Column("unit", say("SI unit")),
+        Column("scale_from", say("Scale from")),
+        Column("scaling", say("Conversion of the log's numbers")),
     )
-    return Table("channels", "Channels", columns, rows)
+    return Table("channels", say("Channels"), columns, rows)
 
 
 def _known_levels(analysis: Analysis) -> Table:
@@ -101,16 +102,16 @@ def _known_levels(analysis: Analysis) -> Table:
             level.level_db,
             level.sigma_db,
             level.weighting,
-            level.origin or "not stated",
+            level.origin or say("not stated"),
         )
         for level in analysis.campaign.levels
     ]
     columns = (
-        Column("condition", "Condition"),
-        Column("distance_m", "Distance", "m", None, "number"),
-        Column("level_db", "Level", "dB re 20 µPa", 1, "number"),
-        Column("sigma_db", "Standard deviation", "dB", 1, "number"),
-        Column("weighting", "Weighting"),
-        Column("origin", "Origin"),
+        Column("condition", say("Condition")),
+        Column("distance_m", say("Distance"), "m", None, "number"),
+        Column("level_db", say("Level"), "dB re 20 µPa", 1, "number"),
+        Column("sigma_db", say("Standard deviation"), "dB", 1, "number"),
+        Column("weighting", say("Weighting")),
+        Column("origin", say("Origin")),
     )
-    return Table("known-levels", "Levels known without logs", columns, rows, origin="printed")
+    return Table("known-levels", say("Levels known without logs"), columns, rows, origin="printed")

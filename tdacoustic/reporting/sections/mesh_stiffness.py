@@ -6,6 +6,7 @@ import numpy as np
 
 from tdacoustic.reporting.document import FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.gear_words import significant
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
@@ -27,23 +28,23 @@ def mesh_stiffness(result: FleetPrediction) -> Section:
     mean = 1e-6 * system.mesh_stiffness_n_per_m
     figure = Figure(
         "mesh-stiffness",
-        "Stiffness of the mesh over two mesh periods",
-        "Along the normal line of action. The axis does not begin at zero.",
-        Axis("Time", "mesh periods"),
-        Axis("Mesh stiffness", "N/µm"),
+        say("Stiffness of the mesh over two mesh periods"),
+        say("Along the normal line of action. The axis does not begin at zero."),
+        Axis(say("Time"), say("mesh periods")),
+        Axis(say("Mesh stiffness"), "N/µm"),
         [
             Line(time, mean * relative, "k_m(t)"),
             Line(time[[0, -1]], np.array([mean, mean]), "mean", style="dashed", color=7),
         ],
         height=340,
     )
-    words = (
+    words = say(
         "The stiffness follows the total length of the contact lines: a trapezoid on each pair of teeth, from the two "
         "contact ratios (equations (4) to (6) of the paper), times the mean stiffness. How stiff a tooth is along its "
         "height, and how the load is shared, is not part of it."
     )
     return Section(
-        "mesh-stiffness", "Mesh stiffness", [Paragraph(words), FigureBlock(figure, "calculated"), _ripple(result)]
+        "mesh-stiffness", say("Mesh stiffness"), [Paragraph(words), FigureBlock(figure, "calculated"), _ripple(result)]
     )
 
 
@@ -51,13 +52,17 @@ def _ripple(result: FleetPrediction) -> Paragraph:
     lines = result.prediction.unit.system.contact_lines
     if lines.is_constant:
         return Paragraph(
-            "A contact ratio is a whole number, so the total length and with it the stiffness is constant."
+            say("A contact ratio is a whole number, so the total length and with it the stiffness is constant.")
         )
     amplitudes = 200.0 * np.abs(lines.fourier(HARMONICS)[1:])
     values = lines.relative(np.arange(SAMPLES) / SAMPLES)
     harmonics = [f"{significant(value, 2)} % (x{n})" for n, value in enumerate(amplitudes, 1)]
     return Paragraph(
-        f"It varies by {significant(100.0 * float(np.ptp(values)), 3)} % of its mean peak to peak. Amplitudes of the "
-        f"mesh harmonics, of the mean: {joined(harmonics)}. With the transmission error this is what excites the "
-        "vibration; the closer a contact ratio is to a whole number, the less of it there is."
+        say(
+            "It varies by {significant} % of its mean peak to peak. Amplitudes of the mesh "
+            "harmonics, of the mean: {harmonics}. With the transmission error this is what excites "
+            "the vibration; the closer a contact ratio is to a whole number, the less of it there is.",
+            significant=significant(100.0 * float(np.ptp(values)), 3),
+            harmonics=joined(harmonics),
+        )
     )

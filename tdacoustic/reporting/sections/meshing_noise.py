@@ -11,6 +11,7 @@ from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Notice, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, level_unit, sentence
 from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.parameters import parameter_table
@@ -40,13 +41,13 @@ PARAMETERS = {
 FEWEST = 3
 """Conditions below which a shape is not compared as a whole."""
 
-METHOD = (
+METHOD = mark(
     "Equation (8) of the paper, after Masuda, Abe and Hattori (1986): L = 20 (1 − tan(β/2)) u^(1/8) / εα^(1/4) "
     "√((5.56 + √v) / 5.56) + 20 lg W + 20 lg X + C, with the power W of one motor in kW and v the speed of the pitch "
     "line in m/s. It is the overall level of a whole gear unit at 1 m, its housing included; how it is spread over "
     "frequencies is not part of it."
 )
-OPEN = (
+OPEN = mark(
     "Its absolute height cannot be held against a measurement before C is calibrated: the unit of W, what X is and C "
     "are open in what is printed, and within one reading they are one additive constant. Differences between "
     "conditions can be compared within one reading; between readings they differ by the torque of each condition."
@@ -57,10 +58,10 @@ def meshing_noise(result: FleetPrediction) -> Section:
     """Return the section on Masuda's meshing noise."""
     states = by_speed(result.prediction.conditions)
     beside = _beside(result.fleet, states)
-    blocks: list[Block] = [Paragraph(METHOD), Paragraph(reading_words(result.fleet)), _reading(result.fleet)]
+    blocks: list[Block] = [Paragraph(say(METHOD)), Paragraph(reading_words(result.fleet)), _reading(result.fleet)]
     silent = [state for state in states if state.masuda_db is None]
     if silent:
-        words = "no power or no vibration, so the formula has no level"
+        words = say("no power or no vibration, so the formula has no level")
         blocks.append(Paragraph(sentence(f"{conditions_words(silent)}: {words}")))
     reference = next((state for state in states if state.masuda_db is not None), None)
     if reference is not None:
@@ -68,12 +69,12 @@ def meshing_noise(result: FleetPrediction) -> Section:
         if len(states) - len(silent) > 1:
             blocks.append(FigureBlock(_figure(result.fleet, states, reference, beside), "calculated"))
     if not _is_calibrated(result.fleet):
-        blocks.append(Paragraph(OPEN))
+        blocks.append(Paragraph(say(OPEN)))
     if beside and reference is not None:
         blocks += _comparison(states, beside)
     judged = judged_words(result, ("masuda_",))
     blocks += [Paragraph(sentence(judged))] if judged else []
-    return Section("meshing-noise", "Meshing noise", blocks)
+    return Section("meshing-noise", say("Meshing noise"), blocks)
 
 
 def reading_words(fleet: Fleet) -> str:
@@ -82,14 +83,23 @@ def reading_words(fleet: Fleet) -> str:
     constant = masuda.constant_db
     value = pretty_signs(f"{constant.value:g}")
     if masuda.displacement.value == "um_pp":
-        x = "X the peak to peak of the DTE in µm"
+        x = say("X the peak to peak of the DTE in µm")
     else:
-        x = "X the peak to peak of the DTE over the static compression F₀ / k̄"
-    text = f"Masuda's level is that at 1 m in {level_unit(fleet)} re 20 µPa with C = {value} dB, {x}, W in kW."
+        x = say("X the peak to peak of the DTE over the static compression F₀ / k̄")
+    text = say(
+        "Masuda's level is that at 1 m in {level_unit} re 20 µPa with C = {value} dB, {x}, W in kW.",
+        level_unit=level_unit(fleet),
+        value=value,
+        x=x,
+    )
     if _is_calibrated(fleet):
         error = "" if constant.stderr is None else f" ± {constant.stderr:.2g} dB"
-        return f"{text} The constant is calibrated{error} ({constant.origin})."
-    return f"{text} The constant is not calibrated, so only differences between conditions mean something."
+        return say(
+            "{text} The constant is calibrated{error} ({origin}).", text=text, error=error, origin=constant.origin
+        )
+    return say(
+        "{text} The constant is not calibrated, so only differences between conditions mean something.", text=text
+    )
 
 
 def _is_calibrated(fleet: Fleet) -> bool:
@@ -98,7 +108,7 @@ def _is_calibrated(fleet: Fleet) -> bool:
 
 
 def _reading(fleet: Fleet) -> Table:
-    return parameter_table("masuda-reading", "The reading of the formula in force", fleet, PARAMETERS.get)
+    return parameter_table("masuda-reading", say("The reading of the formula in force"), fleet, PARAMETERS.get)
 
 
 Beside = dict[str, Printed]
@@ -120,18 +130,20 @@ def _relative(state: GearState, reference: GearState) -> float | None:
 def _table(fleet: Fleet, states: Sequence[GearState], reference: GearState, beside: Beside) -> Table:
     unit, first = level_unit(fleet), reference.condition.name
     columns = [
-        Column("condition", "Condition"),
-        Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"),
-        Column("power_kw", "Power W", "kW", 1, "number"),
-        Column("dte_pp_um", "DTE", "µm, peak to peak", 2, "number"),
-        Column("masuda_spl_1m_db", "Level at 1 m", unit, 1, "number"),
-        Column("relative_db", "Level", f"dB re condition {first}", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
+        Column("power_kw", say("Power W"), "kW", 1, "number"),
+        Column("dte_pp_um", say("DTE"), say("µm, peak to peak"), 2, "number"),
+        Column("masuda_spl_1m_db", say("Level at 1 m"), unit, 1, "number"),
+        Column("relative_db", say("Level"), say("dB re condition {first}", first=first), 1, "number"),
     ]
     printed_first = beside.get(first)
     if beside:
-        columns.append(Column("printed_db", "Table 5", "dB, printed", 2, "number"))
+        columns.append(Column("printed_db", say("Table 5"), say("dB, printed"), 2, "number"))
     if printed_first is not None:
-        columns.append(Column("printed_relative_db", "Table 5", f"dB re condition {first}", 1, "number"))
+        columns.append(
+            Column("printed_relative_db", say("Table 5"), say("dB re condition {first}", first=first), 1, "number")
+        )
     rows: list[list[Cell]] = []
     for state in states:
         condition, row = state.condition, beside.get(state.condition.name)
@@ -142,7 +154,7 @@ def _table(fleet: Fleet, states: Sequence[GearState], reference: GearState, besi
         if printed_first is not None:
             cells.append(None if row is None else row.level_db - printed_first.level_db)
         rows.append(cells)
-    return Table("masuda", "Masuda's meshing noise of the conditions", columns, rows, origin="calculated")
+    return Table("masuda", say("Masuda's meshing noise of the conditions"), columns, rows, origin="calculated")
 
 
 def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, beside: Beside) -> Figure:
@@ -152,25 +164,32 @@ def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, bes
         Line(
             np.array([state.mesh_hz for state in states]),
             np.array([math.nan if value is None else value for value in ours]),
-            "this drive",
+            say("this drive"),
             color=0,
             points=True,
         )
     ]
-    caption = "One dot a condition; the lines between them only lead the eye."
+    caption = say("One dot a condition; the lines between them only lead the eye.")
     if name in beside:
         rows = list(beside.values())
         levels = np.array([row.level_db - beside[name].level_db for row in rows])
         lines.append(
-            Line(np.array([row.mesh_hz for row in rows]), levels, "Table 5, printed", "dashed", color=1, points=True)
+            Line(
+                np.array([row.mesh_hz for row in rows]), levels, say("Table 5, printed"), "dashed", color=1, points=True
+            )
         )
-        caption = f"Calculated, and as printed in Table 5 of {PAPER}, each relative to its condition {name}. {caption}"
+        caption = say(
+            "Calculated, and as printed in Table 5 of {paper}, each relative to its condition {name}. {caption}",
+            paper=say(PAPER),
+            name=name,
+            caption=caption,
+        )
     return Figure(
         "masuda-shape",
-        f"Masuda's level over the conditions, relative to condition {name}",
+        say("Masuda's level over the conditions, relative to condition {name}", name=name),
         caption,
-        Axis("Mesh frequency", "Hz"),
-        Axis("Level", level_unit(fleet), reference=f"condition {name}"),
+        Axis(say("Mesh frequency"), "Hz"),
+        Axis(say("Level"), level_unit(fleet), reference=say("condition {name}", name=name)),
         lines,
         height=360,
     )
@@ -179,11 +198,17 @@ def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, bes
 def _comparison(states: Sequence[GearState], beside: Beside) -> list[Block]:
     of_figure = next(row for row in TABLE_5 if row.condition == FIGURE_11_CONDITION)
     factor = 10.0 ** ((of_figure.level_db - LEVEL_OF_TEXT_DB) / 20.0)
-    notice = (
-        "Against Table 5 only the shape over the conditions can be compared; the absolute level cannot. The paper's "
-        f"own two levels of condition {FIGURE_11_CONDITION} contradict each other: {LEVEL_OF_TEXT_DB:g} dB in section "
-        f"4.3 (with X = {DTE_PP_UM:g} µm) and {of_figure.level_db:g} dB in Table 5, a factor of {factor:.2f} in W X. "
-        "Neither the torque, the transmission error nor the inertias, bearings and damping behind Table 5 are printed."
+    notice = say(
+        "Against Table 5 only the shape over the conditions can be compared; the absolute level "
+        "cannot. The paper's own two levels of condition {figure_11_condition} contradict each "
+        "other: {level_of_text_db:g} dB in section 4.3 (with X = {dte_pp_um:g} µm) and "
+        "{level_db:g} dB in Table 5, a factor of {factor:.2f} in W X. Neither the torque, the "
+        "transmission error nor the inertias, bearings and damping behind Table 5 are printed.",
+        figure_11_condition=FIGURE_11_CONDITION,
+        level_of_text_db=LEVEL_OF_TEXT_DB,
+        dte_pp_um=DTE_PP_UM,
+        level_db=of_figure.level_db,
+        factor=factor,
     )
     offset = _offset_words(states, beside)
     return [Notice("info", notice), *([Sentences([sentence(offset)])] if offset else [])]
@@ -197,7 +222,13 @@ def _offset_words(states: Sequence[GearState], beside: Beside) -> str:
         return ""
     rest = float(np.sqrt(np.mean((off - off.mean()) ** 2)))
     return pretty_signs(
-        f"over {off.size} conditions the level here is {off.mean():+.1f} dB off Table 5 on average, which the "
-        f"constant would take up; in shape the two then differ by {rest:.1f} dB rms, at most by "
-        f"{np.abs(off - off.mean()).max():.1f} dB"
+        say(
+            "over {size} conditions the level here is {off:+.1f} dB off Table 5 on average, which "
+            "the constant would take up; in shape the two then differ by {rest:.1f} dB rms, at most "
+            "by {off_2:.1f} dB",
+            size=off.size,
+            off=off.mean(),
+            rest=rest,
+            off_2=np.abs(off - off.mean()).max(),
+        )
     )

@@ -7,12 +7,13 @@ from typing import Final
 
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Column, Paragraph, Section, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.words import measured_channels, tested_runs
 from tdacoustic.results import Analysis
 
 __all__ = ["method_of_measurement"]
 
-WINDOW: Final = "Hann"
+WINDOW: Final = mark("Hann")
 """Of all averaged spectra (`tdacoustic.spectra`)."""
 
 Row = tuple[str | float | None, ...]
@@ -26,7 +27,7 @@ def method_of_measurement(analysis: Analysis) -> list[Block]:
     analysis : Analysis
     """
     blocks = [*_spectra(analysis), *_orders(analysis)]
-    return [Section("method", "What was done to the recordings", blocks)] if blocks else []
+    return [Section("method", say("What was done to the recordings"), blocks)] if blocks else []
 
 
 def _spectra(analysis: Analysis) -> list[Block]:
@@ -34,18 +35,20 @@ def _spectra(analysis: Analysis) -> list[Block]:
     if not found:
         return []
     columns = (
-        Column("of", "Runs and channels"),
-        Column("sample_rate_hz", "Sampling rate", "Hz", 0, "number"),
-        Column("window", "Window"),
-        Column("frame_s", "Frame", "s", 3, "number"),
-        Column("resolution_hz", "Line spacing", "Hz", 3, "number"),
-        Column("noise_bandwidth_hz", "Noise bandwidth", "Hz", 3, "number"),
-        Column("averages", "Independent averages", "", 1, "number"),
-        Column("band_hz", "Level band", "Hz"),
+        Column("of", say("Runs and channels")),
+        Column("sample_rate_hz", say("Sampling rate"), "Hz", 0, "number"),
+        Column("window", say("Window")),
+        Column("frame_s", say("Frame"), "s", 3, "number"),
+        Column("resolution_hz", say("Line spacing"), "Hz", 3, "number"),
+        Column("noise_bandwidth_hz", say("Noise bandwidth"), "Hz", 3, "number"),
+        Column("averages", say("Independent averages"), "", 1, "number"),
+        Column("band_hz", say("Level band"), "Hz"),
     )
     overlap = analysis.settings.get("analysis.overlap")
-    caption = "Averaged spectra as they were made"
-    caption += f"; frames overlap by {100.0 * overlap:.3g} %" if isinstance(overlap, int | float) else ""
+    caption = say("Averaged spectra as they were made")
+    caption += (
+        say("; frames overlap by {overlap:.3g} %", overlap=100.0 * overlap) if isinstance(overlap, int | float) else ""
+    )
     return [Table("spectra-as-made", caption + ".", columns, [(of, *row) for row, of in found])]
 
 
@@ -58,7 +61,7 @@ def _frames(run: MeasuredRun) -> Iterator[tuple[tuple[str, str], Row]]:
                 (run.name, channel.name),
                 (
                     channel.sample_rate_hz,
-                    WINDOW,
+                    say(WINDOW),
                     spectrum.duration_s,
                     spectrum.resolution_hz,
                     spectrum.noise_bandwidth_hz,
@@ -73,7 +76,7 @@ def _orders(analysis: Analysis) -> list[Block]:
     rows: list[Row] = [
         (
             name,
-            found.shaft or "not named",
+            found.shaft or say("not named"),
             found.speed_source,
             60.0 * found.lowest_hz,
             60.0 * found.highest_hz,
@@ -85,16 +88,16 @@ def _orders(analysis: Analysis) -> list[Block]:
     if not rows:
         return []
     columns = (
-        Column("run", "Run"),
-        Column("shaft", "Angle of the shaft"),
-        Column("speed_source", "Told by"),
-        Column("lowest_rpm", "Slowest", "rpm", 1, "number"),
-        Column("highest_rpm", "Fastest", "rpm", 1, "number"),
-        Column("bandwidth", "Bandwidth", "orders", 3, "number"),
-        Column("highest_order", "Highest order", "", 1, "number"),
+        Column("run", say("Run")),
+        Column("shaft", say("Angle of the shaft")),
+        Column("speed_source", say("Told by")),
+        Column("lowest_rpm", say("Slowest"), "rpm", 1, "number"),
+        Column("highest_rpm", say("Fastest"), "rpm", 1, "number"),
+        Column("bandwidth", say("Bandwidth"), "orders", 3, "number"),
+        Column("highest_order", say("Highest order"), "", 1, "number"),
     )
-    text = "Orders are cut from the signals resampled to even steps of a shaft's angle."
-    return [Paragraph(text), Table("orders-as-made", "Orders as they were cut", columns, rows)]
+    text = say("Orders are cut from the signals resampled to even steps of a shaft's angle.")
+    return [Paragraph(text), Table("orders-as-made", say("Orders as they were cut"), columns, rows)]
 
 
 def _alike(items: Iterator[tuple[tuple[str, str], Row]]) -> list[tuple[Row, str]]:
@@ -109,9 +112,11 @@ def _named(runs: dict[str, list[str]]) -> str:
     by_channels: dict[tuple[str, ...], list[str]] = {}
     for run, channels in runs.items():
         by_channels.setdefault(tuple(channels), []).append(run)
-    return "; ".join(f"run {_few(names)}: {_few(channels)}" for channels, names in by_channels.items())
+    return "; ".join(
+        say("run {few}: {few_2}", few=_few(names), few_2=_few(channels)) for channels, names in by_channels.items()
+    )
 
 
 def _few(names: Sequence[str], most: int = 8) -> str:
     shown = ", ".join(names[:most])
-    return shown if len(names) <= most else f"{shown} and {len(names) - most} more"
+    return shown if len(names) <= most else say("{shown} and {most} more", shown=shown, most=len(names) - most)

@@ -6,6 +6,7 @@ from typing import Final
 
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Block, Notice, Section
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.housing_parameters import housing_named
 from tdacoustic.reporting.sections.meshing_noise import PARAMETERS as MASUDA
 from tdacoustic.reporting.sections.parameters import parameter_table
@@ -56,16 +57,22 @@ _OTHERS: Final = {
 def model_parameters(result: FleetPrediction) -> Section:
     """Return the section on what the model rests on."""
     fleet = result.fleet
-    parts = "gears and sound field" if result.prediction.housing is None else "gears, housing and sound field"
-    caption = f"Parameters that the model of {parts} used, from the fleet file of {fleet.name}"
+    parts = say("gears and sound field") if result.prediction.housing is None else say("gears, housing and sound field")
+    caption = say(
+        "Parameters that the model of {parts} used, from the fleet file of {name}", parts=parts, name=fleet.name
+    )
     table = parameter_table("model-parameters", caption, fleet, lambda key: named(fleet, key))
     standing = [row[2] for row in table.rows]
     assumed = standing.count("assumed")
     blocks: list[Block] = [table]
     if assumed:
-        text = f"{assumed} of {len(standing)} parameters are assumed: they come from no drawing and no measurement."
+        text = say(
+            "{assumed} of {n_standing} parameters are assumed: they come from no drawing and no measurement.",
+            assumed=assumed,
+            n_standing=len(standing),
+        )
         blocks.insert(0, Notice("assumed", text))
-    return Section("model-parameters", "What the model rests on", blocks)
+    return Section("model-parameters", say("What the model rests on"), blocks)
 
 
 def named(fleet: Fleet, key: str) -> tuple[str, str] | None:
@@ -81,7 +88,9 @@ def named(fleet: Fleet, key: str) -> tuple[str, str] | None:
     if section == f"gear_pair.{fleet.modelled_pair_number}":
         return _PAIR.get(last)
     if section.startswith("gear_pair.") and last == "teeth":
-        return f"Teeth of gear pair {fleet.gear_pair[int(section.split('.')[1]) - 1].name}, for its ratio", ""
+        return say(
+            "Teeth of gear pair {name}, for its ratio", name=fleet.gear_pair[int(section.split(".")[1]) - 1].name
+        ), ""
     return housing_named(fleet, key)
 
 

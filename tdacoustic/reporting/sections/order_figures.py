@@ -13,6 +13,7 @@ from tdacoustic.measured.order_results import Average, ChannelOrders, OrderLevel
 from tdacoustic.orders import FixedFrequency
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import joined, pretty_unit, slug
 from tdacoustic.units import REFERENCES, reference_label
 
@@ -39,7 +40,11 @@ OFTEN: Final = 0.15
 
 def shaft_words(orders: RunOrders) -> str:
     """Name of the reference shaft."""
-    return f"{orders.shaft} shaft" if orders.shaft else f"shaft of {orders.speed_source}"
+    return (
+        say("{shaft} shaft", shaft=orders.shaft)
+        if orders.shaft
+        else say("shaft of {speed_source}", speed_source=orders.speed_source)
+    )
 
 
 def order_words(name: str, order: float) -> str:
@@ -50,7 +55,7 @@ def order_words(name: str, order: float) -> str:
     >>> order_words("mesh x1", 31.0), order_words("order 17.4", 17.4)
     ('mesh x1 (order 31)', 'order 17.4')
     """
-    return name if name.startswith("order ") else f"{name} (order {order:.5g})"
+    return name if name.startswith("order ") else say("{name} (order {order:.5g})", name=name, order=order)
 
 
 def level_axis(channel: Channel, label: str = "Level", limits: tuple[float, float] | None = None) -> Axis:
@@ -104,13 +109,19 @@ def cut_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrder
         elements += [tracked[item.order.name]] if item.order.name in tracked else []
     elements += _disturbed(leading, channel)
     count = (
-        f"{len(leading)} strongest orders where they stand" if len(leading) > 1 else "strongest order where it stands"
+        say("{n_leading} strongest orders where they stand", n_leading=len(leading))
+        if len(leading) > 1
+        else say("strongest order where it stands")
     )
     return Figure(
         slug("order-cuts", run, held.channel),
-        f"{held.channel}, run {run}: orders over speed",
-        f"The {count} 6 dB over the floor, the floor taken off. {_bandwidth_words(leading, held)}",
-        Axis(f"Speed of the {shaft_words(orders)}", "rpm"),
+        say("{channel}, run {run}: orders over speed", channel=held.channel, run=run),
+        say(
+            "The {count} 6 dB over the floor, the floor taken off. {bandwidth}",
+            count=count,
+            bandwidth=_bandwidth_words(leading, held),
+        ),
+        Axis(say("Speed of the {shaft}", shaft=shaft_words(orders)), "rpm"),
         level_axis(channel),
         elements,
         height=440,
@@ -126,11 +137,19 @@ def _cut(slot: int, item: OrderLevels, channel: Channel, joined_up: bool) -> lis
     half = np.where(good & (half < 6.0), half, np.nan)
     name, words = item.order.name, order_words(item.order.name, item.order.order)
     return [
-        Band(rpm, level - half, level + half, f"{name}, ± standard error", color=slot),
+        Band(rpm, level - half, level + half, say("{name}, ± standard error", name=name), color=slot),
         Line(rpm, np.where(good, level, np.nan), words, color=slot, points=True)
         if joined_up
         else Markers(rpm[good], level[good], words, color=slot),
-        Line(rpm, levels_db(item.floor, channel), f"floor of {name}", "dotted", slot, opacity=0.7, group="floors"),
+        Line(
+            rpm,
+            levels_db(item.floor, channel),
+            say("floor of {name}", name=name),
+            "dotted",
+            slot,
+            opacity=0.7,
+            group="floors",
+        ),
     ]
 
 
@@ -145,7 +164,7 @@ def _disturbed(leading: Sequence[OrderLevels], channel: Channel) -> list[Element
     if not points:
         return []
     x, y, texts = zip(*points, strict=True)
-    return [Markers(np.array(x), np.array(y), "another line in the band", texts=texts, symbol="x", color=7)]
+    return [Markers(np.array(x), np.array(y), say("another line in the band"), texts=texts, symbol="x", color=7)]
 
 
 def _tracked(leading: Sequence[OrderLevels], held: ChannelOrders, channel: Channel) -> dict[str, Line]:
@@ -158,8 +177,8 @@ def _tracked(leading: Sequence[OrderLevels], held: ChannelOrders, channel: Chann
             continue
         sure = np.where(item.usable & ~item.disturbed, levels_db(item.mean_square, channel), np.nan)
         if np.isfinite(sure).sum() >= 2:
-            words = f"{name} by Vold-Kalman"
-            found[name] = Line(60.0 * item.speeds_hz, sure, words, "dashed", slot, group="by Vold-Kalman")
+            words = say("{name} by Vold-Kalman", name=name)
+            found[name] = Line(60.0 * item.speeds_hz, sure, words, "dashed", slot, group=say("by Vold-Kalman"))
     return found
 
 
@@ -167,14 +186,15 @@ def _bandwidth_words(leading: Sequence[OrderLevels], held: ChannelOrders) -> str
     had = sorted({float(value) for item in leading for value in item.bandwidth if math.isfinite(value)})
     asked = leading[0].requested_bandwidth
     same = all(math.isclose(value, asked, rel_tol=1e-6) for value in had)
-    words = f"Bandwidth of the cuts: {' and '.join(f'{value:.3g}' for value in had)} orders" + (
-        ", as asked for." if same else f" ({asked:.3g} asked for; the run has too few turns)."
+    words = say("Bandwidth of the cuts: {value} orders", value=" and ".join(f"{value:.3g}" for value in had)) + (
+        say(", as asked for.") if same else say(" ({asked:.3g} asked for; the run has too few turns).", asked=asked)
     )
     filters = dict.fromkeys(f"{item.bandwidth_hz:.3g}" for item in sorted(held.tracks, key=lambda t: t.bandwidth_hz))
     if filters:
-        words += (
-            " Dashed, through the dots where both agree, broken where it is not sure: Vold-Kalman filter of "
-            f"2 poles, ±{joined(list(filters)).replace(', ', ', ±').replace(' and ', ' and ±')} Hz, its orders jointly."
+        words += say(
+            " Dashed, through the dots where both agree, broken where it is not sure: "
+            "Vold-Kalman filter of 2 poles, ±{list} Hz, its orders jointly.",
+            list=joined(list(filters)).replace(", ", ", ±").replace(" and ", " and ±"),
         )
     return words
 
@@ -194,17 +214,28 @@ def average_figure(run: str, channel: Channel, average: Average) -> Figure:
     angle = 360.0 * np.arange(average.waveform.size) / average.waveform.size
     residual = math.sqrt(average.residual_mean_square)
     synchronous = float(np.sqrt(np.mean((average.waveform - average.waveform.mean()) ** 2)))
-    unit, error_words = pretty_unit(channel.si_symbol), "± standard error"
+    unit, error_words = pretty_unit(channel.si_symbol), say("± standard error")
     return Figure(
         slug("synchronous", run, channel.name, average.shaft),
-        f"{channel.name}, run {run}: what repeats with every turn of the {average.shaft}",
-        f"Mean over {average.periods} turns, rms {synchronous:.3g} {unit}; what is left of the signal has "
-        f"{residual:.3g} {unit} rms. The band is the mean's standard error.",
-        Axis(f"Angle of the {average.shaft}", "degrees"),
-        Axis("Mean over the turns", unit),
+        say(
+            "{name}, run {run}: what repeats with every turn of the {shaft}",
+            name=channel.name,
+            run=run,
+            shaft=average.shaft,
+        ),
+        say(
+            "Mean over {periods} turns, rms {synchronous:.3g} {unit}; what is left of the signal has "
+            "{residual:.3g} {unit} rms. The band is the mean's standard error.",
+            periods=average.periods,
+            synchronous=synchronous,
+            unit=unit,
+            residual=residual,
+        ),
+        Axis(say("Angle of the {shaft}", shaft=average.shaft), "degrees"),
+        Axis(say("Mean over the turns"), unit),
         [
             Band(angle, average.waveform - average.error, average.waveform + average.error, error_words, color=0),
-            Line(angle, average.waveform, "mean over the turns", color=0, width=1.0),
+            Line(angle, average.waveform, say("mean over the turns"), color=0, width=1.0),
         ],
         height=320,
     )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from tdacoustic.measured.order_results import ChannelOrders, LevelMap, RunOrders
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.figure import Axis, Element, Figure, Heatmap, Line, Markers, Rule
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.order_figures import (
     SURE,
     leading_levels,
@@ -29,12 +30,12 @@ Array = NDArray[np.float64]
 SLOTS: Final = {"mesh": 1, "motor": 3, "wheelset": 5, "inverter": 6, "asked": 1, "found": 4}
 """Colour of whose order it is, the same on every map; each is seen on the map's colours."""
 GROUPS: Final = {
-    "mesh": "mesh",
-    "motor": "motor",
-    "wheelset": "wheelset",
-    "inverter": "inverter, not proportional to speed",
-    "asked": "asked for by the campaign",
-    "found": "found in the map",
+    "mesh": mark("mesh"),
+    "motor": mark("motor"),
+    "wheelset": mark("wheelset"),
+    "inverter": mark("inverter, not proportional to speed"),
+    "asked": mark("asked for by the campaign"),
+    "found": mark("found in the map"),
 }
 SPAN_DB: Final = 60.0
 """Of the colours of a map at most."""
@@ -77,14 +78,18 @@ def frequency_figure(run: str, orders: RunOrders, channel: Channel, held: Channe
         for item in sure_resonances(held)
         if item.frequency_hz <= limit
     ]
-    words = (
-        f"Mean over classes of speed; lines {found.resolution:.3g} Hz apart, a cell shows its strongest. Dotted: where "
-        "orders and lines are expected, by name, whether or not they sound"
+    words = say(
+        "Mean over classes of speed; lines {resolution:.3g} Hz apart, a cell shows its "
+        "strongest. Dotted: where orders and lines are expected, by name, whether or not they "
+        "sound",
+        resolution=found.resolution,
     )
-    words += "; dashed white lines are resonances that orders pass." if fixed else "."
-    title = f"{held.channel}, run {run}: level over frequency and speed"
+    words += say("; dashed white lines are resonances that orders pass.") if fixed else "."
+    title = say("{channel}, run {run}: level over frequency and speed", channel=held.channel, run=run)
     heading = slug("order-map-hz", run, held.channel), title, words
-    return _map(heading, Axis("Frequency", "Hz", limits=(0.0, limit)), orders, channel, found, (sloping, fixed, ends))
+    return _map(
+        heading, Axis(say("Frequency"), "Hz", limits=(0.0, limit)), orders, channel, found, (sloping, fixed, ends)
+    )
 
 
 def order_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrders) -> Figure | None:
@@ -106,7 +111,7 @@ def order_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrd
         Line(
             np.where(item.frequency_hz / speeds <= limit, item.frequency_hz / speeds, np.nan),
             60.0 * speeds,
-            f"resonance at {item.frequency_hz:.0f} Hz",
+            say("resonance at {frequency_hz:.0f} Hz", frequency_hz=item.frequency_hz),
             "dashed",
             6,
         )
@@ -114,12 +119,20 @@ def order_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrd
         if item.frequency_hz / orders.highest_hz <= limit
     ]
     ends = [(order.order, 60.0 * orders.highest_hz, order.name) for order in orders.orders if order.order <= limit]
-    words = (
-        f"Over the angle of the {shaft_words(orders)}; lines {found.resolution:.3g} orders apart, noise bandwidth "
-        f"{found.noise_bandwidth:.3g} orders. What follows the speed stands upright; what is fixed in Hz bends."
+    words = say(
+        "Over the angle of the {shaft}; lines {resolution:.3g} orders apart, noise bandwidth "
+        "{noise_bandwidth:.3g} orders. What follows the speed stands upright; what is fixed in "
+        "Hz bends.",
+        shaft=shaft_words(orders),
+        resolution=found.resolution,
+        noise_bandwidth=found.noise_bandwidth,
     )
-    heading = slug("order-map", run, held.channel), f"{held.channel}, run {run}: level over order and speed", words
-    axis = Axis(f"Order of the {shaft_words(orders)}", limits=(0.0, limit))
+    heading = (
+        slug("order-map", run, held.channel),
+        say("{channel}, run {run}: level over order and speed", channel=held.channel, run=run),
+        words,
+    )
+    axis = Axis(say("Order of the {shaft}", shaft=shaft_words(orders)), limits=(0.0, limit))
     return _map(heading, axis, orders, channel, found, ([], bent, ends))
 
 
@@ -172,7 +185,7 @@ def _heat(found: LevelMap, kept: NDArray[np.bool_], channel: Channel) -> Heatmap
 
 
 def _trace(x: Array, y: Array, limit: float, name: str, kind: str) -> Line:
-    return Line(np.where(x <= limit, x, np.nan), y, name, "dotted", SLOTS[kind], 1.2, 0.9, group=GROUPS[kind])
+    return Line(np.where(x <= limit, x, np.nan), y, name, "dotted", SLOTS[kind], 1.2, 0.9, group=say(GROUPS[kind]))
 
 
 def _names(ends: Sequence[tuple[float, float, str]], found: Collection[str]) -> Markers:
@@ -180,11 +193,13 @@ def _names(ends: Sequence[tuple[float, float, str]], found: Collection[str]) -> 
     ends = sorted(ends, key=lambda end: end[2] in found)  # names that the fleet gives take the room first
     names = [name for *_, name in ends]
     x, y = np.array([x for x, *_ in ends]), np.array([y for _, y, _ in ends])
-    return Markers(x, y, "orders and lines, by name", labels=names, texts=names, symbol="triangle", color=7)
+    return Markers(x, y, say("orders and lines, by name"), labels=names, texts=names, symbol="triangle", color=7)
 
 
 def _speed_axis(orders: RunOrders, found: LevelMap) -> Axis:
     """Speed up to somewhat above the map, for the names."""
     step = float(np.median(np.diff(found.speeds_hz)))
     bottom, top = 60.0 * (float(found.speeds_hz[0]) - 0.5 * step), 60.0 * orders.highest_hz
-    return Axis(f"Speed of the {shaft_words(orders)}", "rpm", limits=(bottom, top + HEAD * (top - bottom)))
+    return Axis(
+        say("Speed of the {shaft}", shaft=shaft_words(orders)), "rpm", limits=(bottom, top + HEAD * (top - bottom))
+    )

@@ -13,6 +13,7 @@ from tdacoustic.measured.order_results import ChannelOrders, RunOrders
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.orders import FixedFrequency
 from tdacoustic.recording import Channel
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.order_figures import leading_levels, order_words, sure_resonances
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import Analysis
@@ -31,7 +32,7 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
     """Which order is the strongest over which speeds."""
     leading = leading_levels(held)
     if not leading:
-        return [f"{channel.name}: no order stands 6 dB over its floor anywhere."]
+        return [say("{name}: no order stands 6 dB over its floor anywhere.", name=channel.name)]
     size = max(item.speeds_hz.size for item in leading)
     whole = [item for item in leading if item.speeds_hz.size == size]  # of the reference shaft: the same classes
     usable = np.array([np.where(item.usable, item.mean_square, 0.0) for item in whole])
@@ -50,10 +51,18 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
         item, own = whole[leader], [(a, b) for who, a, b in spans if who == leader]
         loudest = int(np.argmax(np.where(first == leader, power[leader], 0.0)))
         level = level_db(math.sqrt(power[leader][loudest]), channel.quantity)
-        at = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4]) + (" and elsewhere" if len(own) > 4 else "")
+        at = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4]) + (
+            say(" and elsewhere") if len(own) > 4 else ""
+        )
         sentences.append(
-            f"{channel.name}: {order_words(item.order.name, item.order.order)} is the strongest order {at}, with up to "
-            f"{level:.1f} dB at {rpm[loudest]:.0f} rpm."
+            say(
+                "{name}: {order} is the strongest order {at}, with up to {level:.1f} dB at {rpm:.0f} rpm.",
+                name=channel.name,
+                order=order_words(item.order.name, item.order.order),
+                at=at,
+                level=level,
+                rpm=rpm[loudest],
+            )
         )
     return sentences
 
@@ -75,7 +84,9 @@ def _leaders(usable: NDArray[np.float64], power: NDArray[np.float64]) -> NDArray
 
 
 def _range_words(low: float, high: float) -> str:
-    return f"at {low:.0f} rpm" if low == high else f"from {low:.0f} to {high:.0f} rpm"
+    return (
+        say("at {low:.0f} rpm", low=low) if low == high else say("from {low:.0f} to {high:.0f} rpm", low=low, high=high)
+    )
 
 
 def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list[str]:
@@ -98,27 +109,48 @@ def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list
     for item, names in sorted(groups, key=lambda group: group[0].frequency_hz):
         if item.kind == "resonance":
             passing = [
-                f"{order_words(order.name, order.order)} at {60.0 * item.frequency_hz / order.order:.0f} rpm"
+                say(
+                    "{order} at {order_2:.0f} rpm",
+                    order=order_words(order.name, order.order),
+                    order_2=60.0 * item.frequency_hz / order.order,
+                )
                 for order in found.orders
                 if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
             ]
-            width = f", {item.loss_factor * item.frequency_hz:.0f} Hz wide at most" if item.loss_factor > 0 else ""
+            width = (
+                say(", {frequency_hz:.0f} Hz wide at most", frequency_hz=item.loss_factor * item.frequency_hz)
+                if item.loss_factor > 0
+                else ""
+            )
             sentences.append(
-                f"A resonance near {item.frequency_hz:.0f} Hz{width} raises what passes it by {item.rise_db:.0f} dB in "
-                f"{_surest(names)}: {joined(passing[:4])}{' and others' if len(passing) > 4 else ''}."
+                say(
+                    "A resonance near {frequency_hz:.0f} Hz{width} raises what passes it by "
+                    "{rise_db:.0f} dB in {surest}: {passing}{value}.",
+                    frequency_hz=item.frequency_hz,
+                    width=width,
+                    rise_db=item.rise_db,
+                    surest=_surest(names),
+                    passing=joined(passing[:4]),
+                    value=say(" and others") if len(passing) > 4 else "",
+                )
             )
         else:
             own = _curve_name(found, item.frequency_hz)
             sentences.append(
-                f"A line at {item.frequency_hz:.1f} Hz{f' ({own})' if own else ''} stays where it is while the speed "
-                f"changes, in {joined(names)}: it is no order of the shaft."
+                say(
+                    "A line at {frequency_hz:.1f} Hz{own} stays where it is while the speed changes, "
+                    "in {names}: it is no order of the shaft.",
+                    frequency_hz=item.frequency_hz,
+                    own=f" ({own})" if own else "",
+                    names=joined(names),
+                )
             )
     return sentences
 
 
 def _surest(names: Sequence[str]) -> str:
     """The channel that the figures are of, and the others that show the same."""
-    return names[0] + (f" (seen in {joined(names[1:])} too)" if len(names) > 1 else "")
+    return names[0] + (say(" (seen in {names} too)", names=joined(names[1:])) if len(names) > 1 else "")
 
 
 def _curve_name(found: RunOrders, frequency_hz: float) -> str:
@@ -146,5 +178,14 @@ def loudest_order_words(analysis: Analysis, run: MeasuredRun, microphones: Seque
         if level is not None and (loudest is None or level > loudest[0]):
             name = order_words(item.order.name, item.order.order)
             rpm = 60.0 * item.speeds_hz[top]
-            loudest = (level, f"{name}, up to {level:.1f} dB at {rpm:.0f} rpm at {held.channel}")
-    return "" if loudest is None else f"strongest order: {loudest[1]}"
+            loudest = (
+                level,
+                say(
+                    "{name}, up to {level:.1f} dB at {rpm:.0f} rpm at {channel}",
+                    name=name,
+                    level=level,
+                    rpm=rpm,
+                    channel=held.channel,
+                ),
+            )
+    return "" if loudest is None else say("strongest order: {loudest}", loudest=loudest[1])

@@ -13,6 +13,7 @@ from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Figure
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.folding import chosen, in_sight
 from tdacoustic.reporting.sections.order_figures import average_figure, cut_figure, shaft_words
 from tdacoustic.reporting.sections.order_maps import frequency_figure, order_figure
@@ -51,17 +52,24 @@ def orders(analysis: Analysis) -> Section | None:
     if steady:
         blocks.append(_steady(analysis, steady, microphones))
     blocks += _sidebands(analysis)
-    return Section("orders", "Orders", [*blocks, Paragraph(_method(held))])
+    return Section("orders", say("Orders"), [*blocks, Paragraph(_method(held))])
 
 
 def _method(held: Sequence[tuple[MeasuredRun, RunOrders]]) -> str:
     shafts = joined(list(dict.fromkeys(shaft_words(found) for _, found in held)))
     asked = held[0][1].requested_bandwidth
-    named = "and named by the fleet" if any(_named(found) for _, found in held) else "and nobody names their owners"
-    return (
-        f"Signals are resampled to even steps of the angle of the {shafts}; orders are per turn of it, {named}. "
-        f"Cuts are {asked:.3g} orders wide; each level has its floor and standard error, and orders.csv says why one "
-        "is missing or doubtful."
+    named = (
+        say("and named by the fleet")
+        if any(_named(found) for _, found in held)
+        else say("and nobody names their owners")
+    )
+    return say(
+        "Signals are resampled to even steps of the angle of the {shafts}; orders are per turn "
+        "of it, {named}. Cuts are {asked:.3g} orders wide; each level has its floor and standard "
+        "error, and orders.csv says why one is missing or doubtful.",
+        shafts=shafts,
+        named=named,
+        asked=asked,
     )
 
 
@@ -88,7 +96,11 @@ def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones:
         for sentence in leader_sentences(channel, held)
     ]
     sentences += [*fixed_sentences(found, [held for _, held in channels])]
-    sentences += [f"The angle of the {shaft_words(found)}: {note}." for note in found.notes if note not in _told(run)]
+    sentences += [
+        say("The angle of the {shaft}: {note}.", shaft=shaft_words(found), note=note)
+        for note in found.notes
+        if note not in _told(run)
+    ]
     sentences += list(dict.fromkeys(note[:1].upper() + note[1:] + "." for _, held in channels for note in held.notes))
     blocks: list[Block] = [Sentences([pretty_signs(sentence) for sentence in sentences])] if sentences else []
     open_ones = [name for name in microphones if any(c.name == name for c, _ in channels)][:SHOWN]
@@ -103,12 +115,16 @@ def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones:
         if channel.name in open_ones:
             figures.insert(1, order_figure(run.name, found, channel, held))
         views.append((channel.name, [FigureBlock(figure, origin) for figure in figures if isinstance(figure, Figure)]))
-    blocks += chosen("Channel", [(name, shown) for name, shown in views if shown])
+    blocks += chosen(say("Channel"), [(name, shown) for name, shown in views if shown])
     left = len(channels) - len(drawn)
     if left > 0:
-        blocks.append(Paragraph(f"Maps and orders of {left} more channels are in result.h5 and orders.csv."))
+        blocks.append(
+            Paragraph(say("Maps and orders of {left} more channels are in result.h5 and orders.csv.", left=left))
+        )
     blocks += _fixed_table(analysis, run)
-    return Section(slug("orders-of", run.name), f"Run {run.name}: {speed_words(run)}", blocks)
+    return Section(
+        slug("orders-of", run.name), say("Run {name}: {speed}", name=run.name, speed=speed_words(run)), blocks
+    )
 
 
 def _told(run: MeasuredRun) -> set[str]:
@@ -123,21 +139,23 @@ def _fixed_table(analysis: Analysis, run: MeasuredRun) -> list[Block]:
     if not len(held):
         return []
     columns = (
-        Column("channel", "Channel"),
-        Column("kind", "What"),
-        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
-        Column("width_hz", "Width", "Hz", 1, "number"),
-        Column("rise_db", "Over its surroundings", "dB", 1, "number"),
-        Column("confidence", "Confidence", "", 2, "number"),
-        Column("orders", "Orders that pass"),
-        Column("detail", "By what"),
+        Column("channel", say("Channel")),
+        Column("kind", say("What")),
+        Column("frequency_hz", say("Frequency"), "Hz", 1, "number"),
+        Column("width_hz", say("Width"), "Hz", 1, "number"),
+        Column("rise_db", say("Over its surroundings"), "dB", 1, "number"),
+        Column("confidence", say("Confidence"), "", 2, "number"),
+        Column("orders", say("Orders that pass")),
+        Column("detail", say("By what")),
     )
     name = slug("resonances", run.name)
-    caption = (
-        f"What stays at its frequency while the speed changes, run {run.name}. A resonance raises orders that pass "
-        "it; a line is there by itself at each class of speed. The width is an upper bound: the sweep broadens it."
+    caption = say(
+        "What stays at its frequency while the speed changes, run {name}. A resonance raises "
+        "orders that pass it; a line is there by itself at each class of speed. The width is an "
+        "upper bound: the sweep broadens it.",
+        name=run.name,
     )
-    return [in_sight(Table(name, caption, columns, _cells(held, columns)), "What stays at its frequency")]
+    return [in_sight(Table(name, caption, columns, _cells(held, columns)), say("What stays at its frequency"))]
 
 
 # ------------------------------------------------------------ steady runs
@@ -172,31 +190,46 @@ def _steady(analysis: Analysis, held: Sequence[tuple[MeasuredRun, RunOrders]], m
     if shares:
         low, high = min(shares), max(shares)
         words = (
-            f"Of the sound energy {100.0 * low[0]:.0f} % ({low[1]}, run {low[2]}) to {100.0 * high[0]:.0f} % "
-            f"({high[1]}, run {high[2]}) repeats with every turn of the {shaft_words(held[0][1])}"
+            say(
+                "Of the sound energy {low:.0f} % ({low_2}, run {low_3}) to {high:.0f} % ({high_2}, "
+                "run {high_3}) repeats with every turn of the {shaft}",
+                low=100.0 * low[0],
+                low_2=low[1],
+                low_3=low[2],
+                high=100.0 * high[0],
+                high_2=high[1],
+                high_3=high[2],
+                shaft=shaft_words(held[0][1]),
+            )
             if len(shares) > 1
-            else f"Of the sound energy at {low[1]} {100.0 * low[0]:.0f} % repeats with every turn of the "
-            f"{shaft_words(held[0][1])}"
+            else say(
+                "Of the sound energy at {low} {low_2:.0f} % repeats with every turn of the {shaft}",
+                low=low[1],
+                low_2=100.0 * low[0],
+                shaft=shaft_words(held[0][1]),
+            )
         )
-        blocks.append(Paragraph(f"{words}: gears and what turns. The rest is what does not follow the shaft."))
+        blocks.append(
+            Paragraph(say("{words}: gears and what turns. The rest is what does not follow the shaft.", words=words))
+        )
     columns = (
-        Column("run", "Run"),
-        Column("channel", "Channel"),
-        Column("shaft", "Shaft"),
-        Column("turns", "Turns", "", 0, "number"),
-        Column("synchronous_db", "Repeats every turn", "dB", 1, "number"),
-        Column("residual_db", "The rest", "dB", 1, "number"),
-        Column("share", "Share that repeats", "%", 0, "number"),
+        Column("run", say("Run")),
+        Column("channel", say("Channel")),
+        Column("shaft", say("Shaft")),
+        Column("turns", say("Turns"), "", 0, "number"),
+        Column("synchronous_db", say("Repeats every turn"), "dB", 1, "number"),
+        Column("residual_db", say("The rest"), "dB", 1, "number"),
+        Column("share", say("Share that repeats"), "%", 0, "number"),
     )
-    caption = (
+    caption = say(
         "Time-synchronous averages of the runs of constant speed. The average of N turns keeps 1/N of the energy of "
         "what does not repeat."
     )
     if rows:
         table = Table("synchronous", caption, columns, rows)
         shown = [FigureBlock(average_figure(best[1].name, *best[2:]), analysis.campaign.origin)] if best else []
-        blocks.append(Details(f"{len(rows)} synchronous averages", [table, *shown]))
-    return Section("synchronous-averages", "What repeats with every turn, at constant speed", blocks)
+        blocks.append(Details(say("{n_rows} synchronous averages", n_rows=len(rows)), [table, *shown]))
+    return Section("synchronous-averages", say("What repeats with every turn, at constant speed"), blocks)
 
 
 # ------------------------------------------------------------ sidebands
@@ -209,22 +242,28 @@ def _sidebands(analysis: Analysis) -> list[Block]:
     held = table[table["pairs"] > 0]
     carriers = joined(list(dict.fromkeys(table["carrier"]))[:6])
     if not len(held):
-        return [Paragraph(f"No pair of sidebands of {carriers} stands 6 dB over the floor on both sides.")]
+        return [
+            Paragraph(
+                say("No pair of sidebands of {carriers} stands 6 dB over the floor on both sides.", carriers=carriers)
+            )
+        ]
     columns = (
-        Column("run", "Run"),
-        Column("channel", "Channel"),
-        Column("carrier", "Carrier"),
-        Column("spacing", "Spaced by"),
-        Column("speed_rpm", "Speed", "rpm", 0, "number"),
-        Column("pairs", "Pairs", "", 0, "number"),
-        Column("sidebands_db", "Sidebands over carrier", "dB", 1, "number"),
-        Column("amplitude_depth", "Amplitude modulation", "", 3, "number"),
-        Column("phase_depth_rad", "Phase modulation", "rad", 3, "number"),
-        Column("reason", "Remark"),
+        Column("run", say("Run")),
+        Column("channel", say("Channel")),
+        Column("carrier", say("Carrier")),
+        Column("spacing", say("Spaced by")),
+        Column("speed_rpm", say("Speed"), "rpm", 0, "number"),
+        Column("pairs", say("Pairs"), "", 0, "number"),
+        Column("sidebands_db", say("Sidebands over carrier"), "dB", 1, "number"),
+        Column("amplitude_depth", say("Amplitude modulation"), "", 3, "number"),
+        Column("phase_depth_rad", say("Phase modulation"), "rad", 3, "number"),
+        Column("reason", say("Remark")),
     )
     rows = _cells(held, columns)
-    name = "Pairs of sidebands that stand 6 dB over the floor on both sides"
-    folded = Details(f"Sidebands over speed, {len(rows)} rows", [Table("sidebands", name, columns, rows)])
+    name = say("Pairs of sidebands that stand 6 dB over the floor on both sides")
+    folded = Details(
+        say("Sidebands over speed, {n_rows} rows", n_rows=len(rows)), [Table("sidebands", name, columns, rows)]
+    )
     return [Paragraph(_sideband_words(held)), folded]
 
 
@@ -235,14 +274,26 @@ def _sideband_words(held: pd.DataFrame) -> str:
         strongest = family.loc[family["sidebands_db"].idxmax()]
         steady = int((~family["reason"].fillna("").str.contains("unsteady")).sum())
         said.append(
-            f"of {carrier}, spaced by the {spacing}, up to {strongest['sidebands_db']:.1f} dB against the carrier "
-            f"({strongest['channel']}, {strongest['speed_rpm']:.0f} rpm), with steady phases in {steady} of "
-            f"{len(family)} findings"
+            say(
+                "of {carrier}, spaced by the {spacing}, up to {sidebands_db:.1f} dB against the "
+                "carrier ({channel}, {speed_rpm:.0f} rpm), with steady phases in {steady} of "
+                "{n_family} findings",
+                carrier=carrier,
+                spacing=spacing,
+                sidebands_db=strongest["sidebands_db"],
+                channel=strongest["channel"],
+                speed_rpm=strongest["speed_rpm"],
+                steady=steady,
+                n_family=len(family),
+            )
         )
     faint = ""
     if held["sidebands_db"].max() < FAINT_DB:
-        faint = f" All are more than {-FAINT_DB:.0f} dB below their carrier: too faint to matter to the sound."
-    return pretty_signs(f"Sidebands stand out {'; '.join(said)}.{faint}")
+        faint = say(
+            " All are more than {faint_db:.0f} dB below their carrier: too faint to matter to the sound.",
+            faint_db=-FAINT_DB,
+        )
+    return pretty_signs(say("Sidebands stand out {said}.{faint}", said="; ".join(said), faint=faint))
 
 
 def _cells(held: pd.DataFrame, columns: Sequence[Column]) -> list[list[Any]]:

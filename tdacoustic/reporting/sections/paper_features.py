@@ -19,6 +19,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.printed import is_of_the_paper
 from tdacoustic.results import FleetPrediction
 from tdacoustic.studies import QUANTITIES, FeatureCheck, ReferenceCheck
@@ -38,25 +39,31 @@ def paper_features(result: FleetPrediction) -> Section | None:
         return None
     blocks: list[Block] = [Paragraph(_method(result))]
     if features:
-        blocks.append(Paragraph(f"Of {len(features)} features {_count(features)}."))
+        blocks.append(
+            Paragraph(say("Of {n_features} features {count}.", n_features=len(features), count=_count(features)))
+        )
         words = [feature_words(check, result.fleet) for check in features]
         blocks.append(Sentences([one.statement for one in words]))
         told = [one.dependence for one in words if one.dependence]
         inside: list[Block] = [_feature_table(result), Sentences(told)]
-        blocks.append(Details("Margins of the features, and what they depend on", inside))
+        blocks.append(Details(say("Margins of the features, and what they depend on"), inside))
     if references:
-        blocks.append(Paragraph(f"Of {len(references)} numbers {_count(references)}."))
+        blocks.append(
+            Paragraph(say("Of {n_references} numbers {count}.", n_references=len(references), count=_count(references)))
+        )
         blocks += [FigureBlock(figure, "calculated") for figure in _figures(result)]
         blocks.append(_reference_table(result))
         words = [reference_words(check, result.fleet) for check in references]
         told = [one.dependence for one in words if one.dependence]
-        blocks += [Details("What the numbers depend on", [Sentences(told)])] if told else []
+        blocks += [Details(say("What the numbers depend on"), [Sentences(told)])] if told else []
     return Section("references", _title(result), blocks)
 
 
 def _title(result: FleetPrediction) -> str:
     of_paper = is_of_the_paper(result.fleet)
-    return "Printed numbers and features beside the model's" if of_paper else "Other numbers beside the model's"
+    return (
+        say("Printed numbers and features beside the model's") if of_paper else say("Other numbers beside the model's")
+    )
 
 
 def features_words(result: FleetPrediction) -> str:
@@ -64,9 +71,16 @@ def features_words(result: FleetPrediction) -> str:
     features = result.studies.features
     if not features:
         return ""
-    of_whom = "of the paper" if is_of_the_paper(result.fleet) else "of another source"
-    parts = [f"of {len(features)} features {of_whom} {_count(features)}"]
-    for holds, lead in ((False, "not reproduced"), (None, "not determined")):
+    of_whom = say("of the paper") if is_of_the_paper(result.fleet) else say("of another source")
+    parts = [
+        say(
+            "of {n_features} features {of_whom} {count}",
+            n_features=len(features),
+            of_whom=of_whom,
+            count=_count(features),
+        )
+    ]
+    for holds, lead in ((False, say("not reproduced")), (None, say("not determined"))):
         names = [check.feature.label for check in features if check.holds is holds]
         parts += [f"{lead}: {', '.join(names)}"] if names else []
     return "; ".join(parts)
@@ -89,73 +103,93 @@ def judged_words(result: FleetPrediction, quantities: tuple[str, ...]) -> str:
         named.setdefault(_verdict(check.holds), []).append(check.feature.label)
     parts = [f"{verdict}: {', '.join(labels)}" for verdict, labels in named.items()]
     section = f"{QUOTES[0]}{_title(result)}{QUOTES[1]}"
-    return f"features of another source, as judged in the section {section}: {'; '.join(parts)}"
+    return say(
+        "features of another source, as judged in the section {section}: {parts}",
+        section=section,
+        parts="; ".join(parts),
+    )
 
 
 def _method(result: FleetPrediction) -> str:
     low, high = SCAN_FACTORS[0], SCAN_FACTORS[-1]
-    vectors = " of those that need no new transfer vectors" if result.prediction.housing is not None else ""
-    return (
-        "Numbers and features that the fleet file states of another source. A margin is by how much a feature is "
-        "there (below zero: by how much it is missing), in dB, in degrees of a direction, or in correlation; "
-        "amplitudes count as 20 lg. Up to a feature's tolerance (0.5 dB of a shape where the file says nothing) values "
-        "count as level: a rise or fall with a larger dip in it is none. "
-        "A number is reproduced where the model is within the tolerance. What a margin or a difference depends on is "
-        "its slope, told for 10 % more of an assumed parameter, or 1 dB more of a level. Each assumed parameter alone"
-        f"{',' + vectors + ',' if vectors else ''} was also moved to {len(SCAN_FACTORS)} values from {low:.2g} to "
-        f"{high:g} times its own (±{SCAN_DB[-1]:g} dB of a level), to see whether it alone could turn the verdict; "
-        "between two such values the place is interpolated."
+    vectors = say(" of those that need no new transfer vectors") if result.prediction.housing is not None else ""
+    return say(
+        "Numbers and features that the fleet file states of another source. A margin is by how "
+        "much a feature is there (below zero: by how much it is missing), in dB, in degrees of a "
+        "direction, or in correlation; amplitudes count as 20 lg. Up to a feature's tolerance "
+        "(0.5 dB of a shape where the file says nothing) values count as level: a rise or fall "
+        "with a larger dip in it is none. A number is reproduced where the model is within the "
+        "tolerance. What a margin or a difference depends on is its slope, told for 10 % more of "
+        "an assumed parameter, or 1 dB more of a level. Each assumed parameter alone{vectors} "
+        "was also moved to {n_scan_factors} values from {low:.2g} to {high:g} times its own "
+        "(±{scan_db:g} dB of a level), to see whether it alone could turn the verdict; between "
+        "two such values the place is interpolated.",
+        vectors="," + vectors + "," if vectors else "",
+        n_scan_factors=len(SCAN_FACTORS),
+        low=low,
+        high=high,
+        scan_db=SCAN_DB[-1],
     )
 
 
 def _count(checks: tuple[FeatureCheck, ...] | tuple[ReferenceCheck, ...]) -> str:
     verdicts = [check.holds for check in checks]
     there, missing, open_ = verdicts.count(True), verdicts.count(False), verdicts.count(None)
-    text = f"{there} {'is' if there == 1 else 'are'} reproduced, {missing} {'is' if missing == 1 else 'are'} not"
-    return text + (f", and {open_} cannot be said" if open_ else "")
+    text = say(
+        "{there} {value} reproduced, {missing} {value_2} not",
+        there=there,
+        value="is" if there == 1 else "are",
+        missing=missing,
+        value_2="is" if missing == 1 else "are",
+    )
+    return text + (say(", and {open} cannot be said", open=open_) if open_ else "")
 
 
 def _verdict(holds: bool | None) -> str:
-    return "not determined" if holds is None else "reproduced" if holds else "not reproduced"
+    return say("not determined") if holds is None else "reproduced" if holds else say("not reproduced")
 
 
 def _feature_table(result: FleetPrediction) -> Table:
     columns = (
-        Column("feature", "Feature"),
-        Column("verdict", "Verdict", kind="verdict"),
-        Column("margin", "Margin", align="right"),
-        Column("origin", "Where it comes from"),
+        Column("feature", say("Feature")),
+        Column("verdict", say("Verdict"), kind="verdict"),
+        Column("margin", say("Margin"), align="right"),
+        Column("origin", say("Where it comes from")),
     )
     rows: list[list[Cell]] = []
     for check in result.studies.features:
         rows.append([check.feature.label, _verdict(check.holds), margin_words(check), check.feature.origin])
-    return Table("features", "Features of another source in the model", columns, rows, origin="calculated")
+    return Table("features", say("Features of another source in the model"), columns, rows, origin="calculated")
 
 
 def _reference_table(result: FleetPrediction) -> Table:
     columns = (
-        Column("number", "Number"),
-        Column("unit", "Unit"),
-        Column("reference_value", "Printed", "", None, "number"),
-        Column("model_value", "Model", "", None, "number"),
-        Column("difference", "Difference", align="right"),
-        Column("verdict", "Verdict", kind="verdict"),
-        Column("origin", "Where it comes from"),
+        Column("number", say("Number")),
+        Column("unit", say("Unit")),
+        Column("reference_value", say("Printed"), "", None, "number"),
+        Column("model_value", say("Model"), "", None, "number"),
+        Column("difference", say("Difference"), align="right"),
+        Column("verdict", say("Verdict"), kind="verdict"),
+        Column("origin", say("Where it comes from")),
     )
     rows: list[list[Cell]] = []
     for check in result.studies.references:
         held = check.reference
         names = held.condition or ()
-        where = f"condition {' or '.join(names)}" if names else f"helix angle {held.helix_angle_deg:g}°"
+        where = (
+            say("condition {names}", names=" or ".join(names))
+            if names
+            else say("helix angle {helix_angle_deg:g}°", helix_angle_deg=held.helix_angle_deg)
+        )
         if len(names) > 1 and check.case is not None:
-            where += f" (here {check.case.name})"
+            where += say(" (here {name})", name=check.case.name)
         quantity = quantity_words(held.quantity, result.fleet)
         number = f"{quantity[:1].upper()}{quantity[1:]}, {where}{', measured' if held.kind == 'measured' else ''}"
         unit = _UNITS[held.quantity.rpartition("_")[2]]
         value = None if math.isnan(check.value) else float(f"{check.value:.4g}")
         off = difference_words(check)
         rows.append([number, unit, held.value, value, off, _verdict(check.holds), held.origin])
-    return Table("reference-numbers", "Numbers of another source and the model's", columns, rows)
+    return Table("reference-numbers", say("Numbers of another source and the model's"), columns, rows)
 
 
 def _figures(result: FleetPrediction) -> list[Figure]:
@@ -179,8 +213,8 @@ def _figure(result: FleetPrediction, quantity: str, checks: list[ReferenceCheck]
     held.sort(key=lambda place: responses.cases[place].value)
     speeds = np.array([responses.cases[place].value for place in held])
     own = responses.base[held, QUANTITIES.index(quantity)]
-    elements: list[Element] = [Line(speeds, own, "this model", color=7, points=True)]
-    for kind, name, slot in (("model", "printed, of a model", 1), ("measured", "printed, measured", 0)):
+    elements: list[Element] = [Line(speeds, own, say("this model"), color=7, points=True)]
+    for kind, name, slot in (("model", say("printed, of a model"), 1), ("measured", say("printed, measured"), 0)):
         of_kind = [check for check in checks if check.reference.kind == kind]
         if of_kind:
             at = [check.case.value for check in of_kind if check.case is not None]
@@ -192,6 +226,13 @@ def _figure(result: FleetPrediction, quantity: str, checks: list[ReferenceCheck]
     label = f"{words[:1].upper()}{words[1:]}"
     reference = "20 µPa" if quantity.endswith("_db") and quantity != "range_12m_db" else None
     name = f"reference-{quantity.replace('_', '-')}"
-    caption = "Points are numbers of another source, the line is this model."
+    caption = say("Points are numbers of another source, the line is this model.")
     axis = Axis(label, unit, reference=reference)
-    return Figure(name, f"{label}, printed and of this model", caption, Axis("Train speed", "km/h"), axis, elements)
+    return Figure(
+        name,
+        say("{label}, printed and of this model", label=label),
+        caption,
+        Axis(say("Train speed"), "km/h"),
+        axis,
+        elements,
+    )

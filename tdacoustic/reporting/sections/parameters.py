@@ -7,6 +7,7 @@ from collections.abc import Callable
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.studies.words import number_words, unit_of
 
@@ -72,10 +73,10 @@ def parameter_table(name: str, caption: str, fleet: Fleet, named: Callable[[str]
             value += f" ± {parameter.stderr:.2g}"
         rows.append([words, f"{value} {unit}".rstrip(), "assumed" if assumed else None, origin])
     columns = (
-        Column("parameter", "Parameter"),
-        Column("value", "Value"),
-        Column("standing", "Standing", kind="origin"),
-        Column("origin", "Where it comes from"),
+        Column("parameter", say("Parameter")),
+        Column("value", say("Value")),
+        Column("standing", say("Standing"), kind="origin"),
+        Column("origin", say("Where it comes from")),
     )
     return Table(name, caption, columns, rows)
 
@@ -92,7 +93,10 @@ def value_words(key: str, value: object) -> str:
     """
     if isinstance(value, tuple) and value and isinstance(value[0], tuple):
         speed = "km/h" if key == "operation.torque_table" else "rpm"
-        return "; ".join(f"{_number(row[1])} at {_number(row[0])} {speed}" for row in value)
+        return "; ".join(
+            say("{number} at {number_2} {speed}", number=_number(row[1]), number_2=_number(row[0]), speed=speed)
+            for row in value
+        )
     if isinstance(value, tuple):
         return (" : " if key.endswith(".teeth") else ", ").join(_number(item) for item in value)
     return _number(value, 7) if isinstance(value, int | float) else str(value)

@@ -7,6 +7,7 @@ from typing import Final, NamedTuple
 
 from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
+from tdacoustic.reporting.language import mark
 
 __all__ = [
     "DTE_PP_UM",
@@ -23,7 +24,7 @@ __all__ = [
     "printed_of",
 ]
 
-PAPER: Final = "Appl. Sci. 2025, 15, 10597"
+PAPER: Final = mark("Appl. Sci. 2025, 15, 10597")
 
 
 class Printed(NamedTuple):

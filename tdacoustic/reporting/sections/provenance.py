@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.method import method_of_measurement
 from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
 
@@ -29,31 +30,31 @@ def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
         *inputs_of(analysis.inputs),
         settings_of(analysis.settings),
         *method_of_measurement(analysis),
-        Section("assumptions", "Assumptions", [Sentences(ASSUMPTIONS)]),
+        Section("assumptions", say("Assumptions"), [Sentences(ASSUMPTIONS)]),
         *behind,
         *steps_of(analysis),
         versions_of(analysis.versions),
     ]
-    return Section("provenance", "How the numbers came about", blocks)
+    return Section("provenance", say("How the numbers came about"), blocks)
 
 
 def inputs_of(files: Sequence[LogInput]) -> list[Block]:
     """Return the table of the files that went in; nothing of none."""
-    columns = (Column("file", "File"), Column("format", "Format"), Column("sha256", "SHA-256"))
+    columns = (Column("file", say("File")), Column("format", say("Format")), Column("sha256", say("SHA-256")))
     rows = [(file.written, file.format, file.sha256) for file in files]
-    return [Table("inputs", "Inputs", columns, rows)] if rows else []
+    return [Table("inputs", say("Inputs"), columns, rows)] if rows else []
 
 
 def settings_of(settings: Mapping[str, object]) -> Section:
     """Return the section on settings, by key."""
-    columns = (Column("setting", "Setting"), Column("value", "Value"))
+    columns = (Column("setting", say("Setting")), Column("value", say("Value")))
     rows = [(key, _shown(value)) for key, value in settings.items()]
-    return Section("settings", "Settings", [Table("settings", "Settings in force", columns, rows)])
+    return Section("settings", say("Settings"), [Table("settings", say("Settings in force"), columns, rows)])
 
 
 def versions_of(versions: Mapping[str, str]) -> Section:
     """Return the section on the versions of what made the numbers."""
-    return Section("versions", "Versions", [Facts(list(versions.items()))])
+    return Section("versions", say("Versions"), [Facts(list(versions.items()))])
 
 
 def _shown(value: object) -> str:
@@ -80,15 +81,15 @@ def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]
         if named[record.step] <= MOST_OF_A_STEP:
             rows.append((record.label, record.title, record.step, record.version, key[:16], made_from))
         elif named[record.step] == often[record.step]:
-            more = f"{often[record.step] - MOST_OF_A_STEP} more, see manifest.json"
+            more = say("{most_of_a_step} more, see manifest.json", most_of_a_step=often[record.step] - MOST_OF_A_STEP)
             rows.append((more, record.title, record.step, record.version, "", ""))
     columns = (
-        Column("label", "Of"),
-        Column("title", "Step"),
-        Column("step", "Name"),
-        Column("version", "Version", "", 0, "number"),
-        Column("key", "Key"),
-        Column("inputs", "Made from"),
+        Column("label", say("Of")),
+        Column("title", say("Step")),
+        Column("step", say("Name")),
+        Column("version", say("Version"), "", 0, "number"),
+        Column("key", say("Key")),
+        Column("inputs", say("Made from")),
     )
-    table = Table("steps", "Steps and what they were made from", columns, rows)
-    return [Details(f"{len(result.records)} steps", [table])] if rows else []
+    table = Table("steps", say("Steps and what they were made from"), columns, rows)
+    return [Details(say("{n_records} steps", n_records=len(result.records)), [table])] if rows else []

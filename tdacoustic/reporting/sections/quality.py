@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tdacoustic.reporting.document import Block, Column, Details, Paragraph, Section, Table
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import pretty_unit
 from tdacoustic.results import Analysis
 
@@ -20,17 +21,19 @@ _COLUMNS = (
 def quality(analysis: Analysis) -> Section:
     """Return the section on quality."""
     rows = [
-        (run.name, verdict.channel or "whole run", verdict.check, verdict.verdict, pretty_unit(verdict.detail))
+        (run.name, verdict.channel or say("whole run"), verdict.check, verdict.verdict, pretty_unit(verdict.detail))
         for run in analysis.runs
         for verdict in run.all_verdicts
     ]
     striking = sorted((row for row in rows if row[3] != "ok"), key=lambda row: row[3] != "bad")
-    count = f"{len(rows)} checks: {sum(row[3] == 'bad' for row in rows)} bad, "
-    count += f"{sum(row[3] == 'warning' for row in rows)} with a warning."
-    meaning = "A channel with a bad check is not used. The limits of the checks are assumed, from practice."
+    count = say("{n_rows} checks: {value} bad, ", n_rows=len(rows), value=sum(row[3] == "bad" for row in rows))
+    count += say("{value} with a warning.", value=sum(row[3] == "warning" for row in rows))
+    meaning = say("A channel with a bad check is not used. The limits of the checks are assumed, from practice.")
     blocks: list[Block] = [Paragraph(f"{count} {meaning}")]
     if striking:
-        blocks.append(Table("quality-findings", "What is doubtful or cannot be used", _COLUMNS, striking))
+        blocks.append(Table("quality-findings", say("What is doubtful or cannot be used"), _COLUMNS, striking))
     if rows:
-        blocks.append(Details(f"All {len(rows)} checks", [Table("quality", "All checks", _COLUMNS, rows)]))
-    return Section("quality", "Quality of the recordings", blocks)
+        blocks.append(
+            Details(say("All {n_rows} checks", n_rows=len(rows)), [Table("quality", say("All checks"), _COLUMNS, rows)])
+        )
+    return Section("quality", say("Quality of the recordings"), blocks)

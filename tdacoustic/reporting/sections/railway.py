@@ -29,6 +29,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, slug
@@ -44,7 +45,11 @@ MOST_RUNS = 6
 DRAWN_DB = 60.0
 """Below the highest level of a history, what is drawn."""
 
-_STATES = {"met": "all requirements met", "broken": "a requirement broken", "unknown": "requirements unknown"}
+_STATES = {
+    "met": mark("all requirements met"),
+    "broken": mark("a requirement broken"),
+    "unknown": mark("requirements unknown"),
+}
 
 
 def railway(analysis: Analysis) -> Section | None:
@@ -59,15 +64,15 @@ def railway(analysis: Analysis) -> Section | None:
     figures = [FigureBlock(figure, analysis.campaign.origin) for figure in _histories(analysis, found)]
     blocks += figures[:SHOWN_FIGURES]
     if figures[SHOWN_FIGURES:]:
-        blocks.append(Details("Levels over time of the other tests", figures[SHOWN_FIGURES:]))
+        blocks.append(Details(say("Levels over time of the other tests"), figures[SHOWN_FIGURES:]))
     if found.positions:
-        blocks.append(in_sight(_repetition_table(analysis, found.positions), "Repetition by microphone"))
+        blocks.append(in_sight(_repetition_table(analysis, found.positions), say("Repetition by microphone")))
     if found.quantities:
-        blocks.append(in_sight(_quantity_table(analysis, found.quantities), "Quantities of each run"))
+        blocks.append(in_sight(_quantity_table(analysis, found.quantities), say("Quantities of each run")))
         findings = _findings_table(found.quantities)
         if findings is not None:
-            blocks.append(Details("The requirements one by one", [findings]))
-    return Section("railway", "By the railway standards", blocks)
+            blocks.append(Details(say("The requirements one by one"), [findings]))
+    return Section("railway", say("By the railway standards"), blocks)
 
 
 def railway_words(analysis: Analysis, condition: str) -> str:
@@ -83,7 +88,13 @@ def railway_words(analysis: Analysis, condition: str) -> str:
     said: dict[str, list[str]] = {}
     for item in analysis.railway.positions:
         if item.condition == condition and item.decisive and item.repetition.reported_db is not None:
-            words = f"{item.test} {item.symbol} = {item.repetition.reported_db} dB at {item.channel}"
+            words = say(
+                "{test} {symbol} = {reported_db} dB at {channel}",
+                test=item.test,
+                symbol=item.symbol,
+                reported_db=item.repetition.reported_db,
+                channel=item.channel,
+            )
             said.setdefault(words, []).append(item.standard)
     return "; ".join(f"{words} ({joined(standards)})" for words, standards in said.items())
 
@@ -91,17 +102,24 @@ def railway_words(analysis: Analysis, condition: str) -> str:
 def _intro(found: RailwayMeasures) -> str:
     with_level = [item for item in found.quantities if item.quantity.level_db is not None]
     if not found.quantities:
-        return "Nothing is rated: no run that could be measured states its test with a microphone that can be used."
-    words = (
-        f"{len(with_level)} of {len(found.quantities)} quantities could be had from the runs "
-        f"({', '.join(found.standards)}). Levels are A-weighted, re 20 µPa, as measured; one that is corrected for "
-        "background stands beside. A requirement that nothing in campaign and logs tells of is unknown, not met."
+        return say(
+            "Nothing is rated: no run that could be measured states its test with a microphone that can be used."
+        )
+    words = say(
+        "{n_with_level} of {n_quantities} quantities could be had from the runs ({standards}). "
+        "Levels are A-weighted, re 20 µPa, as measured; one that is corrected for background "
+        "stands beside. A requirement that nothing in campaign and logs tells of is unknown, not "
+        "met.",
+        n_with_level=len(with_level),
+        n_quantities=len(found.quantities),
+        standards=", ".join(found.standards),
     )
     doubtful = [name for name in found.standards if not all(rule.verified for rule in STANDARDS[name].rules)]
     if doubtful:
-        words += (
-            f" Rules of {joined(doubtful)} are in part taken over from other editions or from practice "
-            "[not verified against the standard's text]; each says so where it is used."
+        words += say(
+            " Rules of {doubtful} are in part taken over from other editions or from practice "
+            "[not verified against the standard's text]; each says so where it is used.",
+            doubtful=joined(doubtful),
         )
     return words
 
@@ -115,17 +133,28 @@ def _results(analysis: Analysis, found: RailwayMeasures) -> Iterator[str]:
     for position in found.positions:
         groups.setdefault((position.condition, position.standard, position.test, position.symbol), []).append(position)
     for (condition, standard, test, symbol), held in groups.items():
-        words = f"{condition_words(analysis, condition)}, {test} by {standard}"
+        words = say(
+            "{condition}, {test} by {standard}",
+            condition=condition_words(analysis, condition),
+            test=test,
+            standard=standard,
+        )
         yield pretty_signs(f"{words}: {_of_positions(found, symbol, held)}")
     missing: dict[tuple[str, str, str, str, str], list[str]] = {}
     for item in found.quantities:
         q = item.quantity
         if q.level_db is None:
             key = (item.condition, q.standard, q.test, q.symbol, q.reason or "")
-            missing.setdefault(key, []).append(f"{item.channel} in run {item.run}")
+            missing.setdefault(key, []).append(say("{channel} in run {run}", channel=item.channel, run=item.run))
     for (condition, standard, test, symbol, reason), where in missing.items():
-        places = "; ".join(where[:4]) + (f" and {len(where) - 4} more" if len(where) > 4 else "")
-        words = f"{condition_words(analysis, condition)}, {test} by {standard}: no {symbol}"
+        places = "; ".join(where[:4]) + (say(" and {n_where} more", n_where=len(where) - 4) if len(where) > 4 else "")
+        words = say(
+            "{condition}, {test} by {standard}: no {symbol}",
+            condition=condition_words(analysis, condition),
+            test=test,
+            standard=standard,
+            symbol=symbol,
+        )
         yield pretty_signs(f"{words} ({places}): {reason}.")
 
 
@@ -133,17 +162,34 @@ def _of_positions(found: RailwayMeasures, symbol: str, held: Sequence[PositionRe
     best = next((position for position in held if position.decisive), None)
     if best is not None:
         runs = best.repetition
-        of = f" at {best.channel}, the loudest of {len(held)} positions" if len(held) > 1 else f" at {best.channel}"
-        said = (
-            f"{symbol} = {runs.reported_db} dB{of} (mean {runs.mean_db:.1f} dB of {len(runs.levels_db)} runs, "
-            f"{runs.spread_db:.1f} dB apart)"
+        of = (
+            say(" at {channel}, the loudest of {n_held} positions", channel=best.channel, n_held=len(held))
+            if len(held) > 1
+            else say(" at {channel}", channel=best.channel)
+        )
+        said = say(
+            "{symbol} = {reported_db} dB{of} (mean {mean_db:.1f} dB of {n_levels_db} runs, {spread_db:.1f} dB apart)",
+            symbol=symbol,
+            reported_db=runs.reported_db,
+            of=of,
+            mean_db=runs.mean_db,
+            n_levels_db=len(runs.levels_db),
+            spread_db=runs.spread_db,
         )
         return f"{said}; {_state_words(found, best)}."
     parts = []
     for position in held:
         runs = position.repetition
-        count = f"{len(runs.levels_db)} run" + ("s" if len(runs.levels_db) != 1 else "")
-        parts.append(f"{position.channel} {runs.mean_db:.1f} dB of {count}, no result: {runs.reason}")
+        count = say("{n_levels_db} run", n_levels_db=len(runs.levels_db)) + ("s" if len(runs.levels_db) != 1 else "")
+        parts.append(
+            say(
+                "{channel} {mean_db:.1f} dB of {count}, no result: {reason}",
+                channel=position.channel,
+                mean_db=runs.mean_db,
+                count=count,
+                reason=runs.reason,
+            )
+        )
     return f"{symbol}: {'; '.join(parts)}; {_state_words(found, held[0])}."
 
 
@@ -158,9 +204,9 @@ def _state_words(found: RailwayMeasures, position: PositionResult) -> str:
     ]
     broken = list(dict.fromkeys(finding.requirement for finding in findings if finding.state == "broken"))
     unknown = list(dict.fromkeys(finding.requirement for finding in findings if finding.state == "unknown"))
-    parts = [f"broken: {', '.join(broken)}"] if broken else []
-    parts += [f"not known: {', '.join(unknown)}"] if unknown else []
-    return "; ".join(parts) or _STATES["met"]
+    parts = [say("broken: {broken}", broken=", ".join(broken))] if broken else []
+    parts += [say("not known: {unknown}", unknown=", ".join(unknown))] if unknown else []
+    return "; ".join(parts) or say(_STATES["met"])
 
 
 def _units(found: RailwayMeasures) -> Iterator[str]:
@@ -169,12 +215,22 @@ def _units(found: RailwayMeasures) -> Iterator[str]:
 
 
 def _of_unit(unit: UnitResult) -> str:
-    words = f"Condition {unit.condition}, standing unit by {unit.standard}"
+    words = say("Condition {condition}, standing unit by {standard}", condition=unit.condition, standard=unit.standard)
     if unit.level_db is None:
-        return f"{words}: no level of the unit: {unit.reason}."
+        return say("{words}: no level of the unit: {reason}.", words=words, reason=unit.reason)
     if unit.reported_db is None:
-        return f"{words}: {unit.level_db:.1f} dB over its positions, no result: {unit.reason}."
-    return f"{words}: {unit.reported_db} dB over its positions ({unit.level_db:.1f} dB)."
+        return say(
+            "{words}: {level_db:.1f} dB over its positions, no result: {reason}.",
+            words=words,
+            level_db=unit.level_db,
+            reason=unit.reason,
+        )
+    return say(
+        "{words}: {reported_db} dB over its positions ({level_db:.1f} dB).",
+        words=words,
+        reported_db=unit.reported_db,
+        level_db=unit.level_db,
+    )
 
 
 # ---------------------------------------------------------------- figures
@@ -210,19 +266,31 @@ def _history(analysis: Analysis, condition: str, test: str, runs: Sequence[RunQu
         if line is not None:
             elements.append(line)
             if passing and quantity.end_s is not None:
-                rules.append(Rule(quantity.end_s - zero, "rear" if len(runs) == 1 else f"rear, {item.run}"))
+                rules.append(
+                    Rule(quantity.end_s - zero, "rear" if len(runs) == 1 else say("rear, {run}", run=item.run))
+                )
     if not elements:
         return None
     first = runs[0]
-    told = ", ".join(f"run {item.run} {item.quantity.level_db:.1f} dB" for item in runs)
-    since = "Time from the passing of the front" if passing else "Time from the start of the run"
+    told = ", ".join(say("run {run} {level_db:.1f} dB", run=item.run, level_db=item.quantity.level_db) for item in runs)
+    since = say("Time from the passing of the front") if passing else say("Time from the start of the run")
     return Figure(
         slug("level-history", condition, test),
-        f"Level over time: {test}, {condition_words(analysis, condition)}, {first.channel}",
-        f"{first.quantity.symbol} by {first.quantity.standard}: {told}. Drawn is the A-weighted level with time "
-        "weighting F, which reads low for the first half second of a record.",
+        say(
+            "Level over time: {test}, {condition}, {channel}",
+            test=test,
+            condition=condition_words(analysis, condition),
+            channel=first.channel,
+        ),
+        say(
+            "{symbol} by {standard}: {told}. Drawn is the A-weighted level with time weighting F, "
+            "which reads low for the first half second of a record.",
+            symbol=first.quantity.symbol,
+            standard=first.quantity.standard,
+            told=told,
+        ),
         Axis(since, "s"),
-        Axis("A-weighted level", "dB", reference="20 µPa"),
+        Axis(say("A-weighted level"), "dB", reference="20 µPa"),
         [*elements, *rules],
         height=340,
     )
@@ -238,7 +306,9 @@ def _line(item: RunQuantity, hearing: Hearing | None, zero_s: float) -> Line | N
     top = float(np.max(fast, initial=-math.inf))
     if not math.isfinite(top):
         return None
-    return Line(start_s + history.ends_s - zero_s, np.where(fast > top - DRAWN_DB, fast, np.nan), f"run {item.run}")
+    return Line(
+        start_s + history.ends_s - zero_s, np.where(fast > top - DRAWN_DB, fast, np.nan), say("run {run}", run=item.run)
+    )
 
 
 # ---------------------------------------------------------------- tables
@@ -246,41 +316,41 @@ def _line(item: RunQuantity, hearing: Hearing | None, zero_s: float) -> Line | N
 
 def _repetition_table(analysis: Analysis, positions: Sequence[PositionResult]) -> Table:
     columns: list[tuple[Column, Callable[[PositionResult], Cell]]] = [
-        (Column("condition", "Condition"), lambda p: p.condition),
-        (Column("standard", "Standard"), lambda p: p.standard),
-        (Column("test", "Test"), lambda p: p.test),
-        (Column("channel", "Microphone"), lambda p: p.channel + (" (decisive)" if p.decisive else "")),
-        (Column("symbol", "Quantity"), lambda p: p.symbol),
-        (Column("n_runs", "Runs", "", 0, "number"), lambda p: len(p.repetition.levels_db)),
-        (Column("mean_db", "Mean", "dB", 1, "number"), lambda p: p.repetition.mean_db),
-        (Column("spread_db", "Spread", "dB", 1, "number"), lambda p: p.repetition.spread_db),
-        (Column("reported_db", "Result", "dB", 0, "number"), lambda p: p.repetition.reported_db),
-        (Column("state", "Requirements"), lambda p: p.state),
-        (Column("reason", "Why no result"), lambda p: p.repetition.reason or ""),
+        (Column("condition", say("Condition")), lambda p: p.condition),
+        (Column("standard", say("Standard")), lambda p: p.standard),
+        (Column("test", say("Test")), lambda p: p.test),
+        (Column("channel", say("Microphone")), lambda p: p.channel + (" (decisive)" if p.decisive else "")),
+        (Column("symbol", say("Quantity")), lambda p: p.symbol),
+        (Column("n_runs", say("Runs"), "", 0, "number"), lambda p: len(p.repetition.levels_db)),
+        (Column("mean_db", say("Mean"), "dB", 1, "number"), lambda p: p.repetition.mean_db),
+        (Column("spread_db", say("Spread"), "dB", 1, "number"), lambda p: p.repetition.spread_db),
+        (Column("reported_db", say("Result"), "dB", 0, "number"), lambda p: p.repetition.reported_db),
+        (Column("state", say("Requirements")), lambda p: p.state),
+        (Column("reason", say("Why no result")), lambda p: p.repetition.reason or ""),
     ]
-    return item_table("railway-repetition", "Repetition", positions, columns, analysis.campaign.origin)
+    return item_table("railway-repetition", say("Repetition"), positions, columns, analysis.campaign.origin)
 
 
 def _quantity_table(analysis: Analysis, quantities: Sequence[RunQuantity]) -> Table:
     columns: list[tuple[Column, Callable[[RunQuantity], Cell]]] = [
-        (Column("run", "Run"), lambda item: item.run),
-        (Column("channel", "Microphone"), lambda item: item.channel),
-        (Column("standard", "Standard"), lambda item: item.quantity.standard),
-        (Column("test", "Test"), lambda item: item.quantity.test),
-        (Column("symbol", "Quantity"), lambda item: item.quantity.symbol),
-        (Column("level_db", "Level", "dB re 20 µPa", 1, "number"), lambda item: item.quantity.level_db),
-        (Column("corrected_db", "Less background", "dB", 1, "number"), lambda item: item.quantity.corrected_db),
-        (Column("span", "Interval"), lambda item: _span(item.quantity)),
-        (Column("state", "Requirements"), lambda item: item.quantity.state),
-        (Column("reason", "Why no level"), lambda item: item.quantity.reason or ""),
+        (Column("run", say("Run")), lambda item: item.run),
+        (Column("channel", say("Microphone")), lambda item: item.channel),
+        (Column("standard", say("Standard")), lambda item: item.quantity.standard),
+        (Column("test", say("Test")), lambda item: item.quantity.test),
+        (Column("symbol", say("Quantity")), lambda item: item.quantity.symbol),
+        (Column("level_db", say("Level"), "dB re 20 µPa", 1, "number"), lambda item: item.quantity.level_db),
+        (Column("corrected_db", say("Less background"), "dB", 1, "number"), lambda item: item.quantity.corrected_db),
+        (Column("span", say("Interval")), lambda item: _span(item.quantity)),
+        (Column("state", say("Requirements")), lambda item: item.quantity.state),
+        (Column("reason", say("Why no level")), lambda item: item.quantity.reason or ""),
     ]
-    return item_table("railway", "Quantities of each run", quantities, columns, analysis.campaign.origin)
+    return item_table("railway", say("Quantities of each run"), quantities, columns, analysis.campaign.origin)
 
 
 def _span(quantity: Quantity) -> str:
     if quantity.start_s is None or quantity.end_s is None:
         return ""
-    return f"{quantity.start_s:.2f} to {quantity.end_s:.2f} s"
+    return say("{start_s:.2f} to {end_s:.2f} s", start_s=quantity.start_s, end_s=quantity.end_s)
 
 
 def _findings_table(quantities: Sequence[RunQuantity]) -> Table | None:
@@ -294,16 +364,16 @@ def _findings_table(quantities: Sequence[RunQuantity]) -> Table | None:
         return None
     order = {"broken": 0, "unknown": 1, "met": 2}
     columns = (
-        Column("standard", "Standard"),
-        Column("test", "Test"),
-        Column("requirement", "Requirement"),
-        Column("state", "State"),
-        Column("detail", "Found"),
-        Column("origin", "Rule from"),
-        Column("where", "Run and microphone"),
+        Column("standard", say("Standard")),
+        Column("test", say("Test")),
+        Column("requirement", say("Requirement")),
+        Column("state", say("State")),
+        Column("detail", say("Found")),
+        Column("origin", say("Rule from")),
+        Column("where", say("Run and microphone")),
     )
     rows: list[list[Cell]] = [
         [standard, test, finding.requirement, finding.state, finding.detail, finding.origin, "; ".join(where)]
         for (standard, test, finding), where in sorted(groups.items(), key=lambda entry: order[entry[0][2].state])
     ]
-    return Table("railway-findings", "What the standards ask, held against what is known", columns, rows)
+    return Table("railway-findings", say("What the standards ask, held against what is known"), columns, rows)

@@ -6,6 +6,7 @@ import math
 
 from tdacoustic.drive import GearState
 from tdacoustic.reporting.document import Block, Notice, Section, Sentences
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.answer import conditions_answer, verdicts_answer
 from tdacoustic.reporting.sections.calibration import calibration_answer
 from tdacoustic.reporting.sections.gear_answer import asked_lines
@@ -34,19 +35,19 @@ def run_answer(result: CampaignResult) -> list[Block]:
     lines = _dominance_line(result), calibration_line(result), prediction_line(result), *model_lines(result)
     short = [line for line in lines if line]
     blocks: list[Block] = [Sentences(short)] if short else []
-    blocks.append(Section("answer-sources", "Which source dominates", conditions_answer(result.analysis)))
+    blocks.append(Section("answer-sources", say("Which source dominates"), conditions_answer(result.analysis)))
     if result.calibration is not None:
-        blocks.append(Section("answer-fit", "How the model fits", calibration_answer(result.calibration)))
+        blocks.append(Section("answer-fit", say("How the model fits"), calibration_answer(result.calibration)))
     not_done = [Notice("warning", sentence(text)) for text in result.not_done]
     if result.prediction is not None:
         said: list[Block] = [*not_done, *_new_doubts(result)]
         words = _predicted_words(result.prediction)
         said = [Sentences(words), *said] if words else said
-        blocks.append(Section("answer-prediction", "What the model predicts", said))
+        blocks.append(Section("answer-prediction", say("What the model predicts"), said))
     elif not_done:
-        blocks.append(Section("answer-not-done", "What is not done", not_done))
+        blocks.append(Section("answer-not-done", say("What is not done"), not_done))
     verdicts = verdicts_answer(result.analysis)
-    return [*blocks, Section("answer-verdicts", "The verdicts side by side", verdicts)] if verdicts else blocks
+    return [*blocks, Section("answer-verdicts", say("The verdicts side by side"), verdicts)] if verdicts else blocks
 
 
 def calibration_line(result: CampaignResult) -> str:
@@ -55,13 +56,21 @@ def calibration_line(result: CampaignResult) -> str:
         return ""
     found = result.calibration.calibration
     values = [
-        f"{key_words(p.key, found.fleet)} {p.initial:.4g} to {quantity_of(p.key, p.value)}" for p in found.parameters
+        say(
+            "{key} {initial:.4g} to {quantity_of}",
+            key=key_words(p.key, found.fleet),
+            initial=p.initial,
+            quantity_of=quantity_of(p.key, p.value),
+        )
+        for p in found.parameters
     ]
     errors = [(level.before_db - level.datum.level_db, level.error_db) for level in found.levels]
     before, after = (math.hypot(*side) / math.sqrt(len(errors)) for side in zip(*errors, strict=True))
-    misfit = f"levels off by {before:.1f} dB rms before, {after:.1f} dB after"
-    doubts = f"{len(found.doubts)} doubt{'s' if len(found.doubts) != 1 else ''}"
-    return pretty_signs(f"Calibration: {', '.join(values)}; {misfit}; {doubts}.")
+    misfit = say("levels off by {before:.1f} dB rms before, {after:.1f} dB after", before=before, after=after)
+    doubts = say("{n_doubts} doubt{value}", n_doubts=len(found.doubts), value="s" if len(found.doubts) != 1 else "")
+    return pretty_signs(
+        say("Calibration: {values}; {misfit}; {doubts}.", values=", ".join(values), misfit=misfit, doubts=doubts)
+    )
 
 
 def prediction_line(result: CampaignResult) -> str:
@@ -69,7 +78,7 @@ def prediction_line(result: CampaignResult) -> str:
     if result.prediction is None:
         return ""
     levels = _level_words(result.prediction)
-    return f"Prediction with {_which(result)}: {levels or 'no sound'}."
+    return say("Prediction with {which}: {levels}.", which=_which(result), levels=levels or say("no sound"))
 
 
 def model_lines(result: CampaignResult) -> list[str]:
@@ -85,31 +94,44 @@ def _dominance_line(result: CampaignResult) -> str:
     undecided = named.pop("undecided", [])
     if not named:
         return ""
-    parts = [f"the {source} dominates the noise lines in {_conditions(names)}" for source, names in named.items()]
-    parts += [f"undecided in {_conditions(undecided)}"] if undecided else []
+    parts = [
+        say("the {source} dominates the noise lines in {conditions}", source=source, conditions=_conditions(names))
+        for source, names in named.items()
+    ]
+    parts += [say("undecided in {conditions}", conditions=_conditions(undecided))] if undecided else []
     of_sound = [100.0 * v.line_fraction for v in result.analysis.dominance if v.line_fraction is not None]
     ends = list(dict.fromkeys(f"{end:.0f}" for end in (min(of_sound), max(of_sound)))) if of_sound else []
-    parts += [f"these lines are {' to '.join(ends)} % of the sound energy"] if ends else []
+    parts += [say("these lines are {ends} % of the sound energy", ends=" to ".join(ends))] if ends else []
     return sentence("; ".join(parts))
 
 
 def _conditions(names: list[str]) -> str:
-    return f"condition{'s' if len(names) > 1 else ''} {joined(names)}"
+    return say("condition{value} {names}", value="s" if len(names) > 1 else "", names=joined(names))
 
 
 def _predicted_words(found: FleetPrediction) -> list[str]:
     """The prediction in a few sentences, without its levels."""
     forces = [
-        (line[2], f"{newtons(line[2])} at {hertz(line[3])} in {state_words(state)}, {line[0]}, {line[1]}")
+        (
+            line[2],
+            say(
+                "{newtons} at {hertz} in {state}, {line}, {line_2}",
+                newtons=newtons(line[2]),
+                hertz=hertz(line[3]),
+                state=state_words(state),
+                line=line[0],
+                line_2=line[1],
+            ),
+        )
         for state in found.prediction.conditions
         if (line := largest_line(state)) is not None
     ]
     words = [louder] if (louder := _louder_words(found)) else []
-    return [*words, f"The largest bearing force is {max(forces)[1]}."] if forces else words
+    return [*words, say("The largest bearing force is {forces}.", forces=max(forces)[1])] if forces else words
 
 
 def _which(result: CampaignResult) -> str:
-    return "the fleet as it is" if result.calibration is None else "the calibrated fleet"
+    return say("the fleet as it is") if result.calibration is None else say("the calibrated fleet")
 
 
 def _total_db(found: FleetPrediction, state: GearState, path: str = "total") -> float | None:
@@ -120,14 +142,23 @@ def _total_db(found: FleetPrediction, state: GearState, path: str = "total") -> 
 def _level_words(found: FleetPrediction) -> str:
     """Levels on the surface by speed; empty where nothing sounds."""
     levels = [
-        f"{level:.1f} dB in condition {state.condition.name} ({state.condition.train_speed_km_h:.4g} km/h)"
+        say(
+            "{level:.1f} dB in condition {name} ({train_speed_km_h:.4g} km/h)",
+            level=level,
+            name=state.condition.name,
+            train_speed_km_h=state.condition.train_speed_km_h,
+        )
         for state in by_speed(found.prediction.conditions)
         if (level := _total_db(found, state)) is not None
     ]
     if not levels:
         return ""
-    shown = ", ".join(levels) if len(levels) <= MOST_LEVELS else f"{levels[0]} to {levels[-1]}"
-    return f"at {found.prediction.surface} {shown}"
+    shown = (
+        ", ".join(levels)
+        if len(levels) <= MOST_LEVELS
+        else say("{levels} to {levels_2}", levels=levels[0], levels_2=levels[-1])
+    )
+    return say("at {surface} {shown}", surface=found.prediction.surface, shown=shown)
 
 
 def _louder_words(found: FleetPrediction) -> str:
@@ -140,8 +171,18 @@ def _louder_words(found: FleetPrediction) -> str:
         levels = {path: level for path in added if (level := _total_db(found, state, path.key)) is not None}
         if levels:
             held[max(levels, key=levels.__getitem__)].append(state)
-    parts = [f"{path.phrase} in {conditions_words(states)}" for path, states in held.items() if states]
-    return sentence(f"the {'louder' if len(added) == 2 else 'loudest'} part of the total is {', '.join(parts)}")
+    parts = [
+        say("{phrase} in {conditions}", phrase=path.phrase, conditions=conditions_words(states))
+        for path, states in held.items()
+        if states
+    ]
+    return sentence(
+        say(
+            "the {value} part of the total is {parts}",
+            value="louder" if len(added) == 2 else "loudest",
+            parts=", ".join(parts),
+        )
+    )
 
 
 def _new_doubts(result: CampaignResult) -> list[Notice]:

@@ -18,6 +18,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.parameters import value_words
 from tdacoustic.reporting.sections.words import joined, pretty_signs
@@ -30,7 +31,7 @@ from tdacoustic.studies.words import number_words, unit_of
 __all__ = ["sensitivity"]
 
 MOST_BARS: Final = 10
-_OVER: Final = {"conditions": "over the conditions", "helix": "over the helix angles"}
+_OVER: Final = {"conditions": mark("over the conditions"), "helix": mark("over the helix angles")}
 
 
 def sensitivity(result: FleetPrediction) -> Section | None:
@@ -46,38 +47,56 @@ def sensitivity(result: FleetPrediction) -> Section | None:
         blocks.append(FigureBlock(_figure(result, found, ranking), "calculated"))
     if found.rattling:
         blocks.append(Notice("info", _rattling_words(found)))
-    blocks.append(Details("Changes of the total, by parameter", [_table(result, found)]))
+    blocks.append(Details(say("Changes of the total, by parameter"), [_table(result, found)]))
     blocks += _left_out(result.fleet, found)
-    return Section("sensitivity", "What the levels depend on", blocks)
+    return Section("sensitivity", say("What the levels depend on"), blocks)
 
 
 def _method(surface: str) -> str:
-    return (
-        f"Slopes of the level at {surface} when a single parameter moves and all others stay, from central differences "
-        f"of ±{100.0 * STEP_RELATIVE:g} % of the parameter (±{STEP_DB:g} dB of a level). What stands for +10 % is ten "
-        "times what 1 % does, and for +1 dB ten times what 0.1 dB does: linear, not computed with so much more. Near a "
-        "resonance such a step can do much more, or the opposite; [[what_if]] and [[sweep]] compute it. Of a table "
-        "over speed all rows move together."
+    return say(
+        "Slopes of the level at {surface} when a single parameter moves and all others stay, "
+        "from central differences of ±{step_relative:g} % of the parameter (±{step_db:g} dB of a "
+        "level). What stands for +10 % is ten times what 1 % does, and for +1 dB ten times what "
+        "0.1 dB does: linear, not computed with so much more. Near a resonance such a step can "
+        "do much more, or the opposite; [[what_if]] and [[sweep]] compute it. Of a table over "
+        "speed all rows move together.",
+        surface=surface,
+        step_relative=100.0 * STEP_RELATIVE,
+        step_db=STEP_DB,
     )
 
 
 def _rattling_words(found: Sensitivity) -> str:
-    told = [f"condition {case.name}" if case.over == "conditions" else f"{case.name}°" for case in found.rattling]
-    return (
-        f"At {joined(told)} the harmonic balance finds no stable motion when some of the gears' parameters move: these "
-        "changes are left out there, as each would take an integration in time over seconds."
+    told = [
+        say("condition {name}", name=case.name) if case.over == "conditions" else f"{case.name}°"
+        for case in found.rattling
+    ]
+    return say(
+        "At {told} the harmonic balance finds no stable motion when some of the gears' "
+        "parameters move: these changes are left out there, as each would take an integration in "
+        "time over seconds.",
+        told=joined(told),
     )
 
 
 def _ranking_words(fleet: Fleet, found: Sensitivity, ranking: tuple[int, ...]) -> str:
     strongest = found.strongest("conditions")
     told = [
-        f"{number_words(found.varied[place].key, fleet)} "
-        f"({strongest[place]:+.1f} dB for {per_words(found.varied[place].kind)})"
+        say(
+            "{number} ({strongest:+.1f} dB for {per})",
+            number=number_words(found.varied[place].key, fleet),
+            strongest=strongest[place],
+            per=per_words(found.varied[place].kind),
+        )
         for place in ranking[:3]
     ]
     return pretty_signs(
-        sentence(f"of the assumed parameters the total depends most on {joined(told)}: the largest changes over speed")
+        sentence(
+            say(
+                "of the assumed parameters the total depends most on {told}: the largest changes over speed",
+                told=joined(told),
+            )
+        )
     )
 
 
@@ -88,20 +107,24 @@ def _figure(result: FleetPrediction, found: Sensitivity, ranking: tuple[int, ...
         for variation in shown
     ]
     held = [over for over in _OVER if found.of_total(over).shape[1]]
-    bars = [Bars(names, found.strongest(over)[list(ranking)], _OVER[over]) for over in held]
+    bars = [Bars(names, found.strongest(over)[list(ranking)], say(_OVER[over])) for over in held]
     return Figure(
         "sensitivity",
-        "Assumed parameters that the total depends on most",
-        f"Slope of the total at {result.prediction.surface}, told for 10 % more; the largest in size {_or(held)}.",
-        Axis("Parameter"),
-        Axis("Change of the level", "dB"),
+        say("Assumed parameters that the total depends on most"),
+        say(
+            "Slope of the total at {surface}, told for 10 % more; the largest in size {value}.",
+            surface=result.prediction.surface,
+            value=_or(held),
+        ),
+        Axis(say("Parameter")),
+        Axis(say("Change of the level"), "dB"),
         bars,
         height=460,
     )
 
 
 def _or(held: list[str]) -> str:
-    return " or ".join(_OVER[over] for over in held)
+    return " or ".join(say(_OVER[over]) for over in held)
 
 
 def _per(variation: Variation) -> str:
@@ -110,27 +133,33 @@ def _per(variation: Variation) -> str:
 
 def _table(result: FleetPrediction, found: Sensitivity) -> Table:
     columns = [
-        Column("words", "Parameter"),
-        Column("value", "Value"),
-        Column("origin", "Where it comes from"),
-        Column("per", "For"),
+        Column("words", say("Parameter")),
+        Column("value", say("Value")),
+        Column("origin", say("Where it comes from")),
+        Column("per", say("For")),
     ]
     for over in _OVER:
         for case in found.cases:
             if case.over == over:
-                title = f"Condition {case.name}" if over == "conditions" else f"Helix {case.name}°"
+                title = (
+                    say("Condition {name}", name=case.name)
+                    if over == "conditions"
+                    else say("Helix {name}°", name=case.name)
+                )
                 columns.append(Column(f"{over}_{case.name}", title, "dB", 2, "number"))
-    columns.append(Column("parameter", "Key"))
+    columns.append(Column("parameter", say("Key")))
     order = sorted(range(len(found.varied)), key=lambda place: -abs(found.strongest("conditions")[place]))
     rows: list[list[Cell]] = []
     for place in order:
         variation = found.varied[place]
-        value = "over speed" if variation.value is None else _value(variation)
+        value = say("over speed") if variation.value is None else _value(variation)
         changes = [float(change) for over in _OVER for change in found.of_total(over)[place]]
         cells: list[Cell] = [None if math.isnan(change) else change for change in changes]
         words = number_words(variation.key, result.fleet)
         rows.append([words, value, variation.origin, _per(variation), *cells, variation.key])
-    caption = f"Change of the total at {result.prediction.surface} by its slope, by condition and helix angle"
+    caption = say(
+        "Change of the total at {surface} by its slope, by condition and helix angle", surface=result.prediction.surface
+    )
     return Table("sensitivity-total", caption, columns, rows, origin="calculated")
 
 
@@ -148,5 +177,5 @@ def _left_out(fleet: Fleet, found: Sensitivity) -> list[Block]:
         return []
     order = sorted(by_reason, key=lambda reason: (reason != VECTORS, reason != SILENT, reason))
     rows: list[list[Cell]] = [[number_words(key, fleet), reason, key] for reason in order for key in by_reason[reason]]
-    columns = (Column("words", "Parameter"), Column("reason", "Why not"), Column("parameter", "Key"))
-    return [Details("Parameters not varied", [Table("not-varied", "Parameters not varied", columns, rows)])]
+    columns = (Column("words", say("Parameter")), Column("reason", say("Why not")), Column("parameter", say("Key")))
+    return [Details(say("Parameters not varied"), [Table("not-varied", say("Parameters not varied"), columns, rows)])]

@@ -6,6 +6,7 @@ from collections.abc import Hashable, Mapping
 from typing import Any
 
 from tdacoustic.reporting.document import Block, Cell, Column, Notice, Paragraph, Section, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit
 from tdacoustic.results import Analysis
 from tdacoustic.sensors import LIMIT_DB
@@ -73,26 +74,36 @@ def sensors(analysis: Analysis) -> Section | None:
         blocks.append(Paragraph(pretty_signs(_answer(found.calibrations))))
         doubtful = doubtful_channels(analysis)
         if doubtful:
-            text = f"Levels of {joined(doubtful)} are doubtful; they stand marked in the table of levels. {RULE}"
+            text = say(
+                "Levels of {doubtful} are doubtful; they stand marked in the table of levels. {rule}",
+                doubtful=joined(doubtful),
+                rule=RULE,
+            )
             blocks.append(Notice("warning", text))
         else:
             blocks.append(Paragraph(RULE))
     if found.calibrations:
         origin = analysis.campaign.origin
         held = [_of_channel(item) for item in found.calibrations]
-        blocks.append(Table("sensor-scales", "What calibrators say of each channel", _CHANNELS, held, origin=origin))
+        blocks.append(
+            Table("sensor-scales", say("What calibrators say of each channel"), _CHANNELS, held, origin=origin)
+        )
         read = [_cells(row, _READINGS) for row in rows if str(row["kind"]).startswith("calibration_")]
-        blocks.append(Table("calibrator-readings", "Readings of calibrators", _READINGS, read, origin=origin))
-        blocks.append(Paragraph(_METHOD))
+        blocks.append(Table("calibrator-readings", say("Readings of calibrators"), _READINGS, read, origin=origin))
+        blocks.append(Paragraph(say(_METHOD)))
     if found.database:
         table = analysis.campaign.sensor_table
         name = "" if table is None else f" {table.text}"
         held = [_cells(row, _DATABASE) for row in rows if row["kind"] == "database"]
-        blocks.append(Table("sensor-database", f"From the sensor database{name}", _DATABASE, held, origin="printed"))
-    return Section("sensors", "Sensors and calibrators", blocks)
+        blocks.append(
+            Table(
+                "sensor-database", say("From the sensor database{name}", name=name), _DATABASE, held, origin="printed"
+            )
+        )
+    return Section("sensors", say("Sensors and calibrators"), blocks)
 
 
-_METHOD = (
+_METHOD = mark(
     "The calibrator's tone is read where it keeps its level, at the frequency that it is found at, free of window and "
     "of noise beside it. A scale that nobody states is set by the energy mean of the readings before and after; a "
     'stated one is only checked, unless [analysis] calibrators = "set". The deviation is what is read by the stated '
@@ -112,23 +123,34 @@ def _answer(calibrations: tuple[ChannelCalibration, ...]) -> str:
     if done["checked"]:
         worst = max((item for item in calibrations if item.action == "checked"), key=_off)
         parts.append(
-            f"Calibrators check the sensitivity of {joined(done['checked'])}: the largest deviation is "
-            f"{worst.deviation_db or 0.0:+.2f} dB ({worst.channel})."
+            say(
+                "Calibrators check the sensitivity of {checked}: the largest deviation is "
+                "{deviation_db:+.2f} dB ({channel}).",
+                checked=joined(done["checked"]),
+                deviation_db=worst.deviation_db or 0.0,
+                channel=worst.channel,
+            )
         )
     if done["set"]:
-        who = "They set that of" if parts else "Calibrators set the sensitivity of"
+        who = say("They set that of") if parts else say("Calibrators set the sensitivity of")
         parts.append(f"{who} {joined(done['set'])}.")
     drifts = [item for item in calibrations if item.drift_db is not None]
     if drifts:
         most = max(drifts, key=lambda item: abs(item.drift_db or 0.0))
-        limit = "more" if abs(most.drift_db or 0.0) > LIMIT_DB else "no more"
+        limit = "more" if abs(most.drift_db or 0.0) > LIMIT_DB else say("no more")
         parts.append(
-            f"Between before and after the largest drift is {most.drift_db:+.2f} dB ({most.channel}), "
-            f"{limit} than the {LIMIT_DB:g} dB that standards allow."
+            say(
+                "Between before and after the largest drift is {drift_db:+.2f} dB ({channel}), "
+                "{limit} than the {limit_db:g} dB that standards allow.",
+                drift_db=most.drift_db,
+                channel=most.channel,
+                limit=limit,
+                limit_db=LIMIT_DB,
+            )
         )
     elif parts:
-        parts.append("Drift is not known: no channel was read both before and after.")
-    return " ".join(parts) or "No calibrator run could set or check a sensitivity."
+        parts.append(say("Drift is not known: no channel was read both before and after."))
+    return " ".join(parts) or say("No calibrator run could set or check a sensitivity.")
 
 
 def _off(item: ChannelCalibration) -> float:
@@ -136,7 +158,7 @@ def _off(item: ChannelCalibration) -> float:
 
 
 def _of_channel(item: ChannelCalibration) -> tuple[Cell, ...]:
-    words = {"set": "set", "checked": "checked", "reported": "as stated"}
+    words = {"set": "set", "checked": "checked", "reported": say("as stated")}
     return (
         item.channel,
         item.series,

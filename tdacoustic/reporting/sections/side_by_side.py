@@ -16,6 +16,7 @@ from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.reporting.document import Block, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule, Symbol
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.spectra import density_levels, level_axis, quantity_title
 from tdacoustic.reporting.sections.words import (
     OWNER_SLOT_OTHER,
@@ -42,7 +43,7 @@ HEADROOM = 0.35
 OTHER_NAMED = 5
 """Lines of a sensor that are no noise lines and have their name on the picture; all have it under the pointer."""
 
-METHOD = (
+METHOD = mark(
     "One condition after the other: a sensor of the motor, one of the gearbox and one receiver over the same "
     "frequencies. Of each component that sensor is drawn which shows the noise lines best. Broken lines are the "
     "calculated mesh harmonics. A line is named by its frequency and by the order that owns it; '?' where no known "
@@ -61,7 +62,7 @@ def side_by_side(analysis: Analysis) -> Section | None:
             words = condition_words(analysis, condition)
             blocks.append(Section(slug("beside", condition), words, list(view.blocks())))
     return (
-        Section("side-by-side", "Motor, gearbox and noise side by side", [Paragraph(METHOD), *blocks])
+        Section("side-by-side", say("Motor, gearbox and noise side by side"), [Paragraph(say(METHOD)), *blocks])
         if blocks
         else None
     )
@@ -137,7 +138,7 @@ class _View:
             return []
         marks = [(n, n * self.kinematics.mesh_hz) for n in range(1, MESH_HARMONICS + 1)]
         low, high = self.limits
-        return [Rule(x, "mesh x1" if n == 1 else f"x{n}") for n, x in marks if low < x < high]
+        return [Rule(x, say("mesh x1") if n == 1 else f"x{n}") for n, x in marks if low < x < high]
 
     def _trace(self, spectrum: Spectrum, name: str) -> list[Element]:
         kept = (spectrum.frequencies_hz >= 0.5 * LOWEST_HZ) & (spectrum.frequencies_hz <= 1.02 * self.limits[1])
@@ -152,7 +153,7 @@ class _View:
             f"{what.capitalize()}: {quantity_title(result.spectrum.quantity).lower()}, {result.channel}, "
             f"{condition_words(self.analysis, condition)}",
             caption,
-            Axis("Frequency", "Hz", limits=self.limits),
+            Axis(say("Frequency"), "Hz", limits=self.limits),
             self._axis_of(result.spectrum),
             elements,
             height=330,
@@ -181,7 +182,7 @@ class _View:
                     _markers(
                         [line for _, line in held],
                         "sound_pressure",
-                        f"source {owner}",
+                        say("source {owner}", owner=owner),
                         [_label(line, source.excitation_name) for source, line in held],
                         [_noise_words(source, line) for source, line in held],
                         OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
@@ -190,10 +191,16 @@ class _View:
         known = {evidence.line.frequency_hz for _, evidence in self.noise}
         left = [line for line in result.lines if line.frequency_hz not in known]
         if left:
-            labels = [f"{line.frequency_hz:.0f} Hz left out" for line in left]
-            texts = ["left out: see the exclusions"] * len(left)
-            elements.append(_markers(left, "sound_pressure", "left out", labels, texts, 4, "x"))
-        caption = f"Receiver {result.channel}, run {self.run.name}. {_spacing(result.spectrum)} {self._mesh_words()}"
+            labels = [say("{frequency_hz:.0f} Hz left out", frequency_hz=line.frequency_hz) for line in left]
+            texts = [say("left out: see the exclusions")] * len(left)
+            elements.append(_markers(left, "sound_pressure", say("left out"), labels, texts, 4, "x"))
+        caption = say(
+            "Receiver {channel}, run {name}. {spacing} {mesh}",
+            channel=result.channel,
+            name=self.run.name,
+            spacing=_spacing(result.spectrum),
+            mesh=self._mesh_words(),
+        )
         return self._figure("noise", caption, result, [*elements, *self._rules()])
 
     def _sensor_figure(self, component: str, result: ChannelResult, of: Sequence[str]) -> Figure:
@@ -210,10 +217,15 @@ class _View:
             ]
             if shared:
                 labels = [_label(line, source.excitation_name) for line, source in shared]
-                texts = [f"{_line_words(line)}; at the noise line {_hz(source)}" for line, source in shared]
+                texts = [
+                    say("{line}; at the noise line {hz}", line=_line_words(line), hz=_hz(source))
+                    for line, source in shared
+                ]
                 slot = OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER)
                 lines = [line for line, _ in shared]
-                elements.append(_markers(lines, quantity, f"noise line, source {owner}", labels, texts, slot))
+                elements.append(
+                    _markers(lines, quantity, say("noise line, source {owner}", owner=owner), labels, texts, slot)
+                )
         low, high = self.limits
         alone = [line for line in result.lines if found[line.frequency_hz] is None and low <= line.frequency_hz <= high]
         if alone:
@@ -223,14 +235,19 @@ class _View:
             texts = [
                 f"{_line_words(line)}; {name or 'no known order'}" for line, name in zip(alone, names, strict=True)
             ]
-            elements.append(_markers(alone, quantity, "line, not in the noise", labels, texts, 2, "diamond"))
+            elements.append(_markers(alone, quantity, say("line, not in the noise"), labels, texts, 2, "diamond"))
         missing = [_hz(source) for source, _ in self.noise if source not in found.values()]
-        shows = f"No line is found here at the noise lines {joined(missing)}." if missing else ""
+        shows = say("No line is found here at the noise lines {missing}.", missing=joined(missing)) if missing else ""
         if len(missing) == 1:
-            shows = f"No line is found here at the noise line {missing[0]}."
-        best = f"Sensor {result.channel}" + (f" of {joined(list(of))}" if len(of) > 1 else "")
+            shows = say("No line is found here at the noise line {missing}.", missing=missing[0])
+        best = say("Sensor {channel}", channel=result.channel) + (
+            say(" of {list}", list=joined(list(of))) if len(of) > 1 else ""
+        )
         return self._figure(
-            component, f"{best}, run {self.run.name}. {shows}".strip(), result, [*elements, *self._rules()]
+            component,
+            say("{best}, run {name}. {shows}", best=best, name=self.run.name, shows=shows).strip(),
+            result,
+            [*elements, *self._rules()],
         )
 
     def _noise_line_at(self, line: SpectralLine, spectrum: Spectrum) -> SourceLine | None:
@@ -254,7 +271,9 @@ class _View:
         if self.kinematics is None:
             return ""
         speed = "stated" if self.kinematics.motor_hz_stated is not None else "measured"
-        return f"Mesh calculated from the {speed} speed: {self.kinematics.mesh_hz:.1f} Hz."
+        return say(
+            "Mesh calculated from the {speed} speed: {mesh_hz:.1f} Hz.", speed=speed, mesh_hz=self.kinematics.mesh_hz
+        )
 
 
 def _markers(
@@ -281,17 +300,28 @@ def _hz(source: SourceLine) -> str:
 
 
 def _line_words(line: SpectralLine) -> str:
-    return f"{line.frequency_hz:.1f} Hz, {line.prominence_db:.0f} dB over the floor"
+    return say(
+        "{frequency_hz:.1f} Hz, {prominence_db:.0f} dB over the floor",
+        frequency_hz=line.frequency_hz,
+        prominence_db=line.prominence_db,
+    )
 
 
 def _noise_words(source: SourceLine, line: SpectralLine) -> str:
     prominence = source.line.component_prominence_db().items()
-    sensors = [f"{name} {level:.0f} dB" if math.isfinite(level) else f"{name} no trace" for name, level in prominence]
-    words = [_line_words(line), source.excitation_name or "no known order", f"source {source.source}"]
+    sensors = [
+        f"{name} {level:.0f} dB" if math.isfinite(level) else say("{name} no trace", name=name)
+        for name, level in prominence
+    ]
+    words = [
+        _line_words(line),
+        source.excitation_name or say("no known order"),
+        say("source {source}", source=source.source),
+    ]
     if sensors:
-        words.append(f"over the floor of the sensors: {', '.join(sensors)}")
+        words.append(say("over the floor of the sensors: {sensors}", sensors=", ".join(sensors)))
     return "\n".join([*words, *(["conflict"] if source.conflict else [])])
 
 
 def _spacing(spectrum: Spectrum) -> str:
-    return f"Line spacing {spectrum.resolution_hz:.3g} Hz."
+    return say("Line spacing {resolution_hz:.3g} Hz.", resolution_hz=spectrum.resolution_hz)

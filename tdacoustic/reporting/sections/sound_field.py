@@ -21,6 +21,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import conditions_words, sentence
 from tdacoustic.reporting.sections.sound_paths import PATHS, heard_paths, is_added, path_line, total_words
 from tdacoustic.reporting.sections.sound_spectra import sound_spectra
@@ -29,10 +30,10 @@ from tdacoustic.results import FleetPrediction
 
 __all__ = ["sound_field", "sound_words"]
 
-OF_MOTOR = "The motor's tones come from the fleet's excitations."
-OF_MESH = "The meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency"
+OF_MOTOR = mark("The motor's tones come from the fleet's excitations.")
+OF_MESH = mark("The meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency")
 
-OF_POWERS = (
+OF_POWERS = mark(
     "The sound power level of a tone of the motor is that without the housing beside it; that of a tone of the "
     "structure is that of a point source with the same mean level at {surface}."
 )
@@ -59,9 +60,9 @@ def sound_field(result: FleetPrediction) -> Section:
     if tones:
         folded: list[Block] = [_sources(tones, prediction.surface)]
         if prediction.housing is not None:
-            folded.insert(0, Paragraph(OF_POWERS.format(surface=prediction.surface)))
-        blocks.append(Details(f"{len(tones)} sources", folded))
-    return Section("sound-field", "Sound around the drive", blocks)
+            folded.insert(0, Paragraph(say(OF_POWERS).format(surface=prediction.surface)))
+        blocks.append(Details(say("{n_tones} sources", n_tones=len(tones)), folded))
+    return Section("sound-field", say("Sound around the drive"), blocks)
 
 
 def sound_words(result: FleetPrediction, state: GearState) -> str:
@@ -75,11 +76,15 @@ def sound_words(result: FleetPrediction, state: GearState) -> str:
         for wanted in (True, False)
     )
     parts = [", ".join(added)] if added else []
-    parts += [f"not added: {', '.join(beside)}"] if beside else []
+    parts += [say("not added: {beside}", beside=", ".join(beside))] if beside else []
     if not parts:
         return ""
     total = sound.level_db(surface)
-    start = f"no level at {surface}" if total is None else f"level at {surface} {total:.1f} dB"
+    start = (
+        say("no level at {surface}", surface=surface)
+        if total is None
+        else say("level at {surface} {total:.1f} dB", surface=surface, total=total)
+    )
     return f"{start} ({'; '.join(parts)})"
 
 
@@ -88,52 +93,75 @@ def _method(result: FleetPrediction) -> list[Block]:
     where, mean = _space(result.fleet)
     housing = result.prediction.housing
     if housing is None:
-        text = (
-            f"The sources are points in {where}; {mean}. {OF_MOTOR} {OF_MESH}; the housing is already in it. The "
-            "bearing forces' way through the housing is not computed. Levels of both sources stand here whether the "
-            "total adds them or not."
+        text = say(
+            "The sources are points in {where}; {mean}. {of_motor} {of_mesh}; the housing is "
+            "already in it. The bearing forces' way through the housing is not computed. Levels "
+            "of both sources stand here whether the total adds them or not.",
+            where=where,
+            mean=mean,
+            of_motor=say(OF_MOTOR),
+            of_mesh=say(OF_MESH),
         )
         return [Paragraph(text)]
     low, high = housing.range_hz
-    start = (
-        f"In {where} stands the housing, a closed box, computed from {low:.0f} to {high:.0f} Hz; {mean}. Levels of "
-        "every path stand here whether the total adds them or not."
+    start = say(
+        "In {where} stands the housing, a closed box, computed from {low:.0f} to {high:.0f} Hz; "
+        "{mean}. Levels of every path stand here whether the total adds them or not.",
+        where=where,
+        low=low,
+        high=high,
+        mean=mean,
     )
-    beyond = (
-        f"Outside of {low:.0f} to {high:.0f} Hz point sources radiate as if there were no housing, and bearing forces "
-        "give no sound."
+    beyond = say(
+        "Outside of {low:.0f} to {high:.0f} Hz point sources radiate as if there were no "
+        "housing, and bearing forces give no sound.",
+        low=low,
+        high=high,
     )
     return [Paragraph(start), Sentences([*_path_words(result.fleet, housing), beyond])]
 
 
 def _path_words(fleet: Fleet, housing: HousingFacts) -> list[str]:
     gain_db = fleet.model.structure_gain_db.value
-    gain = f", with [model] structure_gain_db = {pretty_signs(f'{gain_db:+g}')} dB" if gain_db else ""
-    structure = (
-        "Structure: the lines of the bearing forces shake the housing at its seats; its modes (finite elements) answer "
-        f"and boundary elements give their sound{gain}."
+    gain = (
+        say(", with [model] structure_gain_db = {gain_db} dB", gain_db=pretty_signs(f"{gain_db:+g}")) if gain_db else ""
     )
-    motor = (
-        f"Motor: {OF_MOTOR[:1].lower()}{OF_MOTOR[1:-1]}, as point sources beside the rigid housing, which scatters "
-        "them. Their volume flow is held, so that the housing changes their power."
+    structure = say(
+        "Structure: the lines of the bearing forces shake the housing at its seats; its modes "
+        "(finite elements) answer and boundary elements give their sound{gain}.",
+        gain=gain,
     )
-    mesh = (
-        f"Mesh: {OF_MESH[:1].lower()}{OF_MESH[1:]}, outside of the housing. That level is of a gear unit with its "
-        "housing, so the power of the source is held: the rigid housing gives it a direction and nothing else."
+    motor = say(
+        "Motor: {of_motor}{of_motor_2}, as point sources beside the rigid housing, which "
+        "scatters them. Their volume flow is held, so that the housing changes their power.",
+        of_motor=say(OF_MOTOR)[:1].lower(),
+        of_motor_2=say(OF_MOTOR)[1:-1],
+    )
+    mesh = say(
+        "Mesh: {of_mesh}{of_mesh_2}, outside of the housing. That level is of a gear unit with "
+        "its housing, so the power of the source is held: the rigid housing gives it a direction "
+        "and nothing else.",
+        of_mesh=say(OF_MESH)[:1].lower(),
+        of_mesh_2=say(OF_MESH)[1:],
     )
     if housing.inside_m is not None:
-        mesh = (
-            f"Mesh: {OF_MESH[:1].lower()}{OF_MESH[1:]}, inside of the housing. Its volume flow is held; the air inside "
-            "shakes the walls, and what they radiate is the level of the mesh (section Insertion loss of the housing). "
-            "Its sound power level is that of a point source with the same mean level outside."
+        mesh = say(
+            "Mesh: {of_mesh}{of_mesh_2}, inside of the housing. Its volume flow is held; the air "
+            "inside shakes the walls, and what they radiate is the level of the mesh (section "
+            "Insertion loss of the housing). Its sound power level is that of a point source "
+            "with the same mean level outside.",
+            of_mesh=say(OF_MESH)[:1].lower(),
+            of_mesh_2=say(OF_MESH)[1:],
         )
     return [structure, *([] if housing.motor_m is None else [motor]), mesh]
 
 
 def _space(fleet: Fleet) -> tuple[str, str]:
     free = fleet.radiation.space.value == "free"
-    where = "free space" if free else "the space over rigid ground at the rail"
-    return where, f"the level is the mean in energy over the {'sphere' if free else 'half sphere'}"
+    where = say("free space") if free else say("the space over rigid ground at the rail")
+    return where, say(
+        "the level is the mean in energy over the {value}", value="sphere" if free else say("half sphere")
+    )
 
 
 def _silent_words(result: FleetPrediction) -> str:
@@ -152,8 +180,13 @@ def _silent_words(result: FleetPrediction) -> str:
         return ""
     low, high = housing.range_hz
     return sentence(
-        f"{conditions_words(silent)}: no line of the bearing forces lies within {low:.0f} to {high:.0f} Hz, so the "
-        "structure has no level there"
+        say(
+            "{conditions}: no line of the bearing forces lies within {low:.0f} to {high:.0f} Hz, so "
+            "the structure has no level there",
+            conditions=conditions_words(silent),
+            low=low,
+            high=high,
+        )
     )
 
 
@@ -172,16 +205,16 @@ def _table(result: FleetPrediction) -> Table:
     surface = result.prediction.surface
     with_structure = result.prediction.housing is not None
     columns = [
-        Column("condition", "Condition"),
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        Column("motor_power_db", "Motor's power", "dB re 1 pW", 1, "number"),
-        Column("motor_spl_db", "Motor", f"dB, {surface}", 1, "number"),
-        Column("mesh_spl_db", "Mesh", f"dB, {surface}", 1, "number"),
-        Column("spl_db", "Total", f"dB, {surface}", 1, "number"),
-        Column("a_weighted_db", "Total", f"dB(A), {surface}", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("train_speed_km_h", say("Speed"), "km/h", 1, "number"),
+        Column("motor_power_db", say("Motor's power"), "dB re 1 pW", 1, "number"),
+        Column("motor_spl_db", say("Motor"), f"dB, {surface}", 1, "number"),
+        Column("mesh_spl_db", say("Mesh"), f"dB, {surface}", 1, "number"),
+        Column("spl_db", say("Total"), f"dB, {surface}", 1, "number"),
+        Column("a_weighted_db", say("Total"), f"dB(A), {surface}", 1, "number"),
     ]
     if with_structure:
-        columns.insert(5, Column("structure_spl_db", "Structure", f"dB, {surface}", 1, "number"))
+        columns.insert(5, Column("structure_spl_db", say("Structure"), f"dB, {surface}", 1, "number"))
     rows: list[list[Cell]] = []
     for state, sound in _conditions(result):
         if sound is None:
@@ -190,19 +223,19 @@ def _table(result: FleetPrediction) -> Table:
         row: list[Cell] = [state.condition.name, state.condition.train_speed_km_h, sound.sound_power_level_db("motor")]
         row += [sound.level_db(surface, path) for path in (*paths, "total")]
         rows.append([*row, sound.level_db(surface, weighting="A")])
-    return Table("levels-4-m", "Levels around the drive, by what makes them", columns, rows, origin="calculated")
+    return Table("levels-4-m", say("Levels around the drive, by what makes them"), columns, rows, origin="calculated")
 
 
 def _sources(tones: Sequence[Sequence[Cell]], surface: str) -> Table:
     columns = (
-        Column("condition", "Condition"),
-        Column("path", "Path"),
-        Column("name", "Source"),
-        Column("frequency_hz", "Frequency", "Hz", 1, "number"),
-        Column("sound_power_level_db", "Sound power level", "dB re 1 pW", 1, "number"),
-        Column("surface_db", "Level", f"dB, {surface}", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("path", say("Path")),
+        Column("name", say("Source")),
+        Column("frequency_hz", say("Frequency"), "Hz", 1, "number"),
+        Column("sound_power_level_db", say("Sound power level"), "dB re 1 pW", 1, "number"),
+        Column("surface_db", say("Level"), f"dB, {surface}", 1, "number"),
     )
-    return Table("sound-sources", "Sources", columns, tones, origin="calculated")
+    return Table("sound-sources", say("Sources"), columns, tones, origin="calculated")
 
 
 def _figure(result: FleetPrediction, levels: dict[str, np.ndarray]) -> Figure:
@@ -219,9 +252,9 @@ def _figure(result: FleetPrediction, levels: dict[str, np.ndarray]) -> Figure:
     ]
     return Figure(
         "level-over-speed",
-        f"Level at {surface} over the train's speed",
-        "Mean in energy over the surface. One dot a condition; the lines between them only lead the eye.",
-        Axis("Train speed", "km/h"),
-        Axis("Sound pressure level", "dB", reference="20 µPa"),
+        say("Level at {surface} over the train's speed", surface=surface),
+        say("Mean in energy over the surface. One dot a condition; the lines between them only lead the eye."),
+        Axis(say("Train speed"), "km/h"),
+        Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         lines,
     )

@@ -11,6 +11,7 @@ from tdacoustic.drive import DriveSound
 from tdacoustic.drive.levels import paths_of_total
 from tdacoustic.fleet import Fleet
 from tdacoustic.reporting.figure import Line, Symbol
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.words import joined
 
@@ -71,11 +72,22 @@ def total_words(fleet: Fleet, paths: Iterable[SoundPath]) -> str:
     beside = [path for path in held if not is_added(fleet, path)]
     if not held:
         return ""
-    text = f"The total adds the energies of {joined(added)}" if len(added) > 1 else f"The total is {''.join(added)}"
-    parts = [text if added else "The total adds nothing of what is shown"]
+    text = (
+        say("The total adds the energies of {added}", added=joined(added))
+        if len(added) > 1
+        else say("The total is {added}", added="".join(added))
+    )
+    parts = [text if added else say("The total adds nothing of what is shown")]
     if beside:
         which = joined([path.phrase for path in beside])
-        parts.append(f"{which} {'are' if len(beside) > 1 else 'is'} shown but not added{_why(fleet, beside)}")
+        parts.append(
+            say(
+                "{which} {value} shown but not added{why}",
+                which=which,
+                value="are" if len(beside) > 1 else "is",
+                why=_why(fleet, beside),
+            )
+        )
     return sentence("; ".join(parts))
 
 
@@ -83,7 +95,7 @@ def path_line(fleet: Fleet, path: SoundPath, x: np.ndarray, levels: np.ndarray) 
     """Return the line of a path beside that of the total: dotted, and named so, where the total does not add it."""
     if is_added(fleet, path):
         return Line(x, levels, path.name, color=path.slot, points=True, style="dashed")
-    return Line(x, levels, f"{path.name} (not added)", color=path.slot, points=True, style="dotted")
+    return Line(x, levels, say("{name} (not added)", name=path.name), color=path.slot, points=True, style="dotted")
 
 
 def _why(fleet: Fleet, beside: list[SoundPath]) -> str:
@@ -92,9 +104,9 @@ def _why(fleet: Fleet, beside: list[SoundPath]) -> str:
     keys = [path.key for path in beside]
     reasons = []
     if "structure" in keys or ("mesh" in keys and gear_path == "structure"):
-        reasons.append(f'[model] gear_path = "{gear_path}"')
+        reasons.append(say('[model] gear_path = "{gear_path}"', gear_path=gear_path))
     if "mesh" in keys and gear_path != "structure":
-        reasons.append(f'[masuda] placement = "{placement}"')
+        reasons.append(say('[masuda] placement = "{placement}"', placement=placement))
     if keys == ["structure"]:
-        reasons.append("Masuda's level already holds what the housing radiates")
+        reasons.append(say("Masuda's level already holds what the housing radiates"))
     return f" ({', '.join(reasons)})" if reasons else ""

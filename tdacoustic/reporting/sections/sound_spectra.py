@@ -9,6 +9,7 @@ import numpy as np
 from tdacoustic.drive import DriveSound, GearState, SoundSource
 from tdacoustic.reporting.document import Block, Details, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, sentence, shown_state, state_words
 from tdacoustic.reporting.sections.sound_paths import PATHS
 from tdacoustic.reporting.sections.words import slug
@@ -33,16 +34,24 @@ def sound_spectra(result: FleetPrediction) -> Section | None:
     if not any(len(sound.sources) >= FEWEST for _, sound in heard):
         return None
     shown = next((pair for pair in heard if pair[0] is shown_state(result)), heard[len(heard) // 2])
-    said = (
-        f"Unweighted level of each tone alone at {prediction.surface}, the mean in energy over the surface. Whether "
-        "the total adds a path is said above."
+    said = say(
+        "Unweighted level of each tone alone at {surface}, the mean in energy over the surface. "
+        "Whether the total adds a path is said above.",
+        surface=prediction.surface,
     )
     blocks: list[Block] = [Paragraph(said), FigureBlock(_figure(result, *shown), "calculated")]
     others = [pair for pair in heard if pair is not shown]
     if others:
         folded = [FigureBlock(_figure(result, *pair), "calculated") for pair in others]
-        blocks.append(Details(sentence(f"tones of {conditions_words([state for state, _ in others])}")[:-1], folded))
-    return Section("sound-tones", "Tones of each path", blocks)
+        blocks.append(
+            Details(
+                sentence(say("tones of {conditions}", conditions=conditions_words([state for state, _ in others])))[
+                    :-1
+                ],
+                folded,
+            )
+        )
+    return Section("sound-tones", say("Tones of each path"), blocks)
 
 
 def _figure(result: FleetPrediction, state: GearState, sound: DriveSound) -> Figure:
@@ -62,14 +71,16 @@ def _figure(result: FleetPrediction, state: GearState, sound: DriveSound) -> Fig
     highest = max(source.frequency_hz for source, _ in drawn)
     housing = result.prediction.housing
     if housing is not None and highest > housing.range_hz[1]:
-        elements.append(Rule(housing.range_hz[1], "end of the housing's range"))
+        elements.append(Rule(housing.range_hz[1], say("end of the housing's range")))
     left_out = len(tones) - len(drawn)
     return Figure(
         slug("tones", state.condition.name),
-        f"Tones of the drive at {result.prediction.surface}, {state_words(state)}",
-        f"{left_out} weaker tone{'s are' if left_out > 1 else ' is'} left out." if left_out else "",
-        Axis("Frequency", "Hz", limits=(0.0, 1.05 * highest)),
-        Axis("Level", "dB", limits=(bottom, top), reference="20 µPa"),
+        say("Tones of the drive at {surface}, {state}", surface=result.prediction.surface, state=state_words(state)),
+        say("{left_out} weaker tone{value} left out.", left_out=left_out, value=say("s are") if left_out > 1 else " is")
+        if left_out
+        else "",
+        Axis(say("Frequency"), "Hz", limits=(0.0, 1.05 * highest)),
+        Axis(say("Level"), "dB", limits=(bottom, top), reference="20 µPa"),
         elements,
         height=300,
     )

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from tdacoustic.attribution import SourceLine
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.words import (
     by_frequency,
     condition_words,
@@ -24,7 +25,7 @@ from tdacoustic.units import level_db
 
 __all__ = ["sources"]
 
-METHOD = (
+METHOD = mark(
     "Two questions are kept apart: which body radiates a line (whose sensors show it over their own local floor) and "
     "what excites it (whose order it is). The source follows the sensors; where both components' sensors or none show "
     "the line, the order decides; where neither does, it stays ambiguous or unassigned. A conflict means that the "
@@ -35,7 +36,7 @@ METHOD = (
 )
 IN_SIGHT = 8
 """Sentences of evidence that are not folded away."""
-NO_LINES = "No noise line was found in a steady run, so there is nothing to ascribe."
+NO_LINES = mark("No noise line was found in a steady run, so there is nothing to ascribe.")
 
 
 def sources(analysis: Analysis) -> Section | None:
@@ -44,13 +45,13 @@ def sources(analysis: Analysis) -> Section | None:
     asked = analysis.fleet is not None and receivers(analysis.runs)
     if not asked and not campaign.excludes and not campaign.overrides:
         return None
-    blocks: list[Block] = [Paragraph(METHOD if analysis.sources else NO_LINES)]
+    blocks: list[Block] = [Paragraph(say(METHOD) if analysis.sources else say(NO_LINES))]
     for condition in campaign.conditions():
         held = [source for source in analysis.sources if source.line.condition == condition]
         if held:
             blocks += [_table(analysis, condition, held), _evidence(held)]
     blocks += _overrides(analysis) + _excludes(analysis)
-    return Section("sources", "Sources of the noise lines", blocks)
+    return Section("sources", say("Sources of the noise lines"), blocks)
 
 
 def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Table:
@@ -58,14 +59,14 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
     marked = any(source.conflict or is_override(source) for source in held)
     several = len({source.line.channel for source in analysis.sources}) > 1
     columns = [
-        Column("frequency_hz", "Line", "Hz", 1, "number"),
-        *([Column("channel", "Receiver")] if several else []),
-        Column("level_db", "Level", "dB", 1, "number"),
+        Column("frequency_hz", say("Line"), "Hz", 1, "number"),
+        *([Column("channel", say("Receiver"))] if several else []),
+        Column("level_db", say("Level"), "dB", 1, "number"),
         *(Column(f"{slug(name)}_prominence_db", name.capitalize(), "dB", 0, "number") for name in components),
-        Column("radiator", "Radiator"),
-        Column("excitation", "Excitation"),
-        Column("source", "Source", kind="verdict"),
-        *([Column("mark", "Mark", kind="verdict")] if marked else []),
+        Column("radiator", say("Radiator")),
+        Column("excitation", say("Excitation")),
+        Column("source", say("Source"), kind="verdict"),
+        *([Column("mark", say("Mark"), kind="verdict")] if marked else []),
         Column("confidence", "P", align="right"),
     ]
     rows = []
@@ -79,14 +80,14 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
             "frequency_hz": source.line.frequency_hz,
             "channel": source.line.channel,
             "level_db": level_db(math.sqrt(source.line.mean_square), "sound_pressure"),
-            "radiator": source.radiator or "not asked",
+            "radiator": source.radiator or say("not asked"),
             "excitation": _excitation_words(source),
             "source": source.source,
             "mark": ", ".join(marks),
             "confidence": "set" if is_override(source) else probability_words(source.confidence),
         }
         rows.append([cells[column.key] for column in columns])
-    title = f"Noise lines, {condition_words(analysis, condition)}"
+    title = say("Noise lines, {condition}", condition=condition_words(analysis, condition))
     verdict = next((v.dominant for v in analysis.dominance if v.condition == condition), None)
     if verdict is not None and analysis.fleet is not None:
         title += f": {verdict}"
@@ -109,7 +110,11 @@ def _evidence(held: Sequence[SourceLine]) -> Block:
         ]
     )
     n_lines = len(sentences.items)
-    return sentences if n_lines <= IN_SIGHT else Details(f"Evidence, {n_lines} sentences", [sentences])
+    return (
+        sentences
+        if n_lines <= IN_SIGHT
+        else Details(say("Evidence, {n_lines} sentences", n_lines=n_lines), [sentences])
+    )
 
 
 def _words(source: SourceLine) -> str:
@@ -133,23 +138,25 @@ def _overrides(analysis: Analysis) -> list[Block]:
     rows = []
     for override in analysis.campaign.overrides:
         struck = [
-            f"{source.line.frequency_hz:.1f} Hz at {source.line.channel}"
+            say(
+                "{frequency_hz:.1f} Hz at {channel}", frequency_hz=source.line.frequency_hz, channel=source.line.channel
+            )
             for source in analysis.sources
             if source.line.condition == override.condition
             and is_override(source)
             and override.reason in source.evidence
             and source.source == override.source
         ]
-        effect = joined(struck) if struck else "no such noise line was found"
+        effect = joined(struck) if struck else say("no such noise line was found")
         rows.append((override.condition, override.frequency_hz, override.source, override.reason, effect))
     columns = (
-        Column("condition", "Condition"),
-        Column("frequency_hz", "Line", "Hz", None, "number"),
-        Column("source", "Source", kind="verdict"),
-        Column("reason", "Reason"),
-        Column("lines", "Lines it was given to"),
+        Column("condition", say("Condition")),
+        Column("frequency_hz", say("Line"), "Hz", None, "number"),
+        Column("source", say("Source"), kind="verdict"),
+        Column("reason", say("Reason")),
+        Column("lines", say("Lines it was given to")),
     )
-    return [Table("overrides", "Overrides by the engineer", columns, rows)] if rows else []
+    return [Table("overrides", say("Overrides by the engineer"), columns, rows)] if rows else []
 
 
 def _excludes(analysis: Analysis) -> list[Block]:
@@ -162,16 +169,29 @@ def _excludes(analysis: Analysis) -> list[Block]:
         inside = table[(table["condition"] == exclude.condition) & table["frequency_hz"].between(low, high)]
         inside = inside[inside["channel"].isin(microphones if exclude.channel is None else [exclude.channel])]
         lines = [
-            f"{row['frequency_hz']:.1f} Hz at {row['channel']}, {row['level_db']:.1f} dB"
+            say(
+                "{frequency_hz:.1f} Hz at {channel}, {level_db:.1f} dB",
+                frequency_hz=row["frequency_hz"],
+                channel=row["channel"],
+                level_db=row["level_db"],
+            )
             for row in inside.to_dict("records")
         ]
-        effect = "; ".join(dict.fromkeys(lines)) or "no noise line lies in it"
-        rows.append((exclude.condition, exclude.channel or "all", f"{low:g} to {high:g}", exclude.reason, effect))
+        effect = "; ".join(dict.fromkeys(lines)) or say("no noise line lies in it")
+        rows.append(
+            (
+                exclude.condition,
+                exclude.channel or "all",
+                say("{low:g} to {high:g}", low=low, high=high),
+                exclude.reason,
+                effect,
+            )
+        )
     columns = (
-        Column("condition", "Condition"),
-        Column("channel", "Channel"),
-        Column("frequency_hz", "Band", "Hz"),
-        Column("reason", "Reason"),
-        Column("lines", "Noise lines left out"),
+        Column("condition", say("Condition")),
+        Column("channel", say("Channel")),
+        Column("frequency_hz", say("Band"), "Hz"),
+        Column("reason", say("Reason")),
+        Column("lines", say("Noise lines left out")),
     )
-    return [Table("exclusions", "Exclusions by the engineer", columns, rows)] if rows else []
+    return [Table("exclusions", say("Exclusions by the engineer"), columns, rows)] if rows else []

@@ -13,6 +13,7 @@ from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Element, Figure, Heatmap, Line, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.folding import chosen
 from tdacoustic.reporting.sections.words import (
     condition_words,
@@ -34,7 +35,7 @@ NAMED_LINES = 8
 """Lines named on one picture; all have their names under the pointer and in the table."""
 LOWEST_HZ = 10.0
 
-_TITLES = {"sound_pressure": "Sound pressure", "acceleration": "Acceleration"}
+_TITLES = {"sound_pressure": mark("Sound pressure"), "acceleration": mark("Acceleration")}
 
 
 def spectra(analysis: Analysis, fold: bool = False) -> Section:
@@ -45,17 +46,17 @@ def spectra(analysis: Analysis, fold: bool = False) -> Section:
         if figures:
             table = _line_table(analysis, run)
             parts: list[Block] = [*figures, *([table] if table is not None else [])]
-            title = f"Run {run.name}: {speed_words(run)}"
-            folded = Details(f"{title}: all channels and lines", parts)
+            title = say("Run {name}: {speed}", name=run.name, speed=speed_words(run))
+            folded = Details(say("{title}: all channels and lines", title=title), parts)
             blocks.append(folded if fold else Section(slug("run", run.name), title, parts))
     if not blocks:
-        blocks = [Paragraph("No channel gave a spectrum.")]
-    method = (
+        blocks = [Paragraph(say("No channel gave a spectrum."))]
+    method = say(
         "Hann window, averaged in energy over overlapping frames; a steady sinusoid shows its rms at its line. "
         "A line has to stand over its local floor (dotted, a running median) by the prominence set in the campaign. "
         "A run whose speed is not constant is shown over time and not averaged."
     )
-    return Section("spectra", "Spectra and lines", [Paragraph(method), *blocks])
+    return Section("spectra", say("Spectra and lines"), [Paragraph(method), *blocks])
 
 
 def _run_figures(analysis: Analysis, run: MeasuredRun) -> list[Block]:
@@ -73,10 +74,10 @@ def _run_figures(analysis: Analysis, run: MeasuredRun) -> list[Block]:
             figure = _spectrum_figure(analysis, run, quantity, some, part)
             names = ", ".join(channel.name for channel, _ in some)
             groups.append((names, [FigureBlock(figure, analysis.campaign.origin)]))
-        figures += chosen("Channels", groups)
+        figures += chosen(say("Channels"), groups)
         drawn = [member for member in members if member[1].map is not None and member[1].map.times_s.size > 1]
         figures += chosen(
-            "Channel",
+            say("Channel"),
             [(member[0].name, [FigureBlock(_map_figure(run, *member), analysis.campaign.origin)]) for member in drawn],
         )
     return figures
@@ -97,9 +98,9 @@ def single_spectrum_figure(spectrum: Spectrum, lines: Sequence[SpectralLine] = (
     elements += _line_markers(spectrum.name, spectrum.quantity, lines, 0, _named([lines])[0], None)
     return Figure(
         slug("spectrum", spectrum.name),
-        f"Spectrum of {spectrum.name}",
-        f"Line spacing {spectrum.resolution_hz:.4g} Hz. " + _interval_words(spectrum),
-        Axis("Frequency", "Hz", "log"),
+        say("Spectrum of {name}", name=spectrum.name),
+        say("Line spacing {resolution_hz:.4g} Hz. ", resolution_hz=spectrum.resolution_hz) + _interval_words(spectrum),
+        Axis(say("Frequency"), "Hz", "log"),
         level_axis(spectrum),
         elements,
     )
@@ -109,23 +110,28 @@ def level_axis(spectrum: Spectrum) -> Axis:
     """Return the axis of a spectrum: level re its reference, else the quantity itself."""
     reference = pretty_unit(reference_label(spectrum.quantity) or "") or None
     title = quantity_title(spectrum.quantity)
-    note = f"rms in {spectrum.noise_bandwidth_hz:.3g} Hz"
+    note = say("rms in {noise_bandwidth_hz:.3g} Hz", noise_bandwidth_hz=spectrum.noise_bandwidth_hz)
     if reference is None:
         return Axis(title, pretty_unit(spectrum.si_symbol), "log", note=note)
-    return Axis(f"{title} level", "dB", reference=reference, note=note)
+    return Axis(say("{title} level", title=title), "dB", reference=reference, note=note)
 
 
 def _interval_words(spectrum: Spectrum) -> str:
     low, high = (10.0 * math.log10(factor) for factor in spectrum.interval())
     return (
-        f"With {spectrum.averages:.3g} independent averages the true density of noise lies within "
-        f"{low:.1f} and {high:+.1f} dB of the trace (95 %)."
+        say(
+            "With {averages:.3g} independent averages the true density of noise lies within "
+            "{low:.1f} and {high:+.1f} dB of the trace (95 %).",
+            averages=spectrum.averages,
+            low=low,
+            high=high,
+        )
     ).replace("-", "\N{MINUS SIGN}")
 
 
 def quantity_title(quantity: str) -> str:
     """Name of a quantity as an axis has it."""
-    return _TITLES.get(quantity, quantity.replace("_", " ").capitalize())
+    return say(_TITLES.get(quantity, quantity.replace("_", " ").capitalize()))
 
 
 def density_levels(spectrum: Spectrum, density: np.ndarray) -> np.ndarray:
@@ -151,15 +157,24 @@ def _spectrum_figure(
         )
         if result.floor is not None and len(held) == 1:
             floor = density_levels(spectrum, result.floor)[first:]
-            elements.append(Line(frequencies, floor, "local floor", style="dotted", color=slot, opacity=0.7))
+            elements.append(Line(frequencies, floor, say("local floor"), style="dotted", color=slot, opacity=0.7))
         elements += _line_markers(channel.name, quantity, result.lines, slot, named[slot], run.motor_speed_hz)
     spectrum = held[0][2]
     return Figure(
         slug("spectrum", run.name, quantity) + part,
-        f"{quantity_title(quantity)}, {condition_words(analysis, run.run.condition or '')}, run {run.name}{part}",
-        f"Line spacing {spectrum.resolution_hz:.4g} Hz. Points are the lines found; the most prominent are named. "
+        say(
+            "{quantity_title}, {condition}, run {name}{part}",
+            quantity_title=quantity_title(quantity),
+            condition=condition_words(analysis, run.run.condition or ""),
+            name=run.name,
+            part=part,
+        ),
+        say(
+            "Line spacing {resolution_hz:.4g} Hz. Points are the lines found; the most prominent are named. ",
+            resolution_hz=spectrum.resolution_hz,
+        )
         + _interval_words(spectrum),
-        Axis("Frequency", "Hz", "log"),
+        Axis(say("Frequency"), "Hz", "log"),
         level_axis(spectrum),
         elements,
         height=440,
@@ -182,7 +197,7 @@ def _line_markers(
         Markers(
             np.array([line.frequency_hz for line in lines]),
             np.array(y),
-            f"lines of {name}",
+            say("lines of {name}", name=name),
             labels=[f"{line.frequency_hz:.0f} Hz" if i in named else "" for i, line in enumerate(lines)],
             texts=[_line_words(line, turns_hz) for line in lines],
             color=slot,
@@ -210,9 +225,15 @@ def _named(lines: Sequence[Sequence[SpectralLine]]) -> list[set[int]]:
 
 
 def _line_words(line: SpectralLine, turns_hz: float | None) -> str:
-    order = f", order {line.frequency_hz / turns_hz:.2f}" if turns_hz else ""
+    order = say(", order {turns_hz:.2f}", turns_hz=line.frequency_hz / turns_hz) if turns_hz else ""
     error = f"± {line.frequency_error_hz:.2g} Hz"
-    return f"{line.frequency_hz:.1f} Hz {error}{order}, {line.prominence_db:.1f} dB over the floor"
+    return say(
+        "{frequency_hz:.1f} Hz {error}{order}, {prominence_db:.1f} dB over the floor",
+        frequency_hz=line.frequency_hz,
+        error=error,
+        order=order,
+        prominence_db=line.prominence_db,
+    )
 
 
 def _map_figure(run: MeasuredRun, channel: Channel, result: ChannelResult) -> Figure:
@@ -224,14 +245,17 @@ def _map_figure(run: MeasuredRun, channel: Channel, result: ChannelResult) -> Fi
     z = np.where(np.isfinite(z), z, np.nan)
     top = float(np.nanmax(z)) if np.isfinite(z).any() else 0.0
     label = pretty_unit(reference_label(channel.quantity) or f"1 {channel.si_symbol}")
-    z_axis = Axis("Density level", "dB", limits=(top - 60.0, top), reference=f"{label} per Hz")
+    z_axis = Axis(say("Density level"), "dB", limits=(top - 60.0, top), reference=say("{label} per Hz", label=label))
     return Figure(
         slug("map", run.name, channel.name),
-        f"Run-up, run {run.name}, {channel.name}: {speed_words(run)}",
-        "Density over time and frequency; each cell is the highest of the lines it covers. Lines that slope follow the "
-        "speed, level ones stay at their frequency.",
-        Axis("Time", "s"),
-        Axis("Frequency", "Hz"),
+        say("Run-up, run {name}, {name_2}: {speed}", name=run.name, name_2=channel.name, speed=speed_words(run)),
+        say(
+            "Density over time and frequency; each cell is the highest of the lines it covers. Lines that slope "
+            "follow the "
+            "speed, level ones stay at their frequency."
+        ),
+        Axis(say("Time"), "s"),
+        Axis(say("Frequency"), "Hz"),
         [Heatmap(held.times_s, held.frequencies_hz, z, channel.name, z_axis)],
         height=460,
     )
@@ -243,13 +267,13 @@ def _line_table(analysis: Analysis, run: MeasuredRun) -> Details | None:
     if not len(held):
         return None
     columns = (
-        Column("channel", "Channel"),
-        Column("frequency_hz", "Frequency", "Hz", 2, "number"),
+        Column("channel", say("Channel")),
+        Column("frequency_hz", say("Frequency"), "Hz", 2, "number"),
         Column("frequency_error_hz", "± (1 σ)", "Hz", 3, "number"),
-        Column("level_db", "Level", "dB", 1, "number"),
-        Column("prominence_db", "Over the floor", "dB", 1, "number"),
-        Column("order", "Order", "per motor turn", 3, "number"),
-        Column("family", "Family"),
+        Column("level_db", say("Level"), "dB", 1, "number"),
+        Column("prominence_db", say("Over the floor"), "dB", 1, "number"),
+        Column("order", say("Order"), say("per motor turn"), 3, "number"),
+        Column("family", say("Family")),
     )
     rows = [
         [row[column.key] if isinstance(row[column.key], str) or column.kind == "number" else "" for column in columns]
@@ -257,6 +281,11 @@ def _line_table(analysis: Analysis, run: MeasuredRun) -> Details | None:
     ]
     name = slug("lines", run.name)
     return Details(
-        f"{len(rows)} {'line' if len(rows) == 1 else 'lines'} of run {run.name}",
-        [Table(name, f"Lines of run {run.name}", columns, rows)],
+        say(
+            "{n_rows} {value} of run {name}",
+            n_rows=len(rows),
+            value="line" if len(rows) == 1 else "lines",
+            name=run.name,
+        ),
+        [Table(name, say("Lines of run {name}", name=run.name), columns, rows)],
     )

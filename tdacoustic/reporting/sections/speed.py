@@ -12,6 +12,7 @@ from tdacoustic.attribution import RunSlip
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.palette import SERIES_SLOTS
 from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit, slug, tested_runs
 from tdacoustic.results import Analysis
@@ -26,7 +27,7 @@ VISIBLE = 0.004
 """Half width of a band, over the range of what is drawn, from which it can be seen."""
 MOST_BANDS = 4
 MOST_SENTENCES = MOST_FAULTS = 6
-_KINDS = {"tacho": "tacho", "channel": "speed channel", "lines": "lines of vibration"}
+_KINDS = {"tacho": mark("tacho"), "channel": mark("speed channel"), "lines": mark("lines of vibration")}
 
 Held = list[tuple[MeasuredRun, SpeedProfile]]
 
@@ -47,8 +48,8 @@ def speed(analysis: Analysis) -> Section | None:
         blocks += [FigureBlock(figure, analysis.campaign.origin) for figure in _figures(teller, shaft, si_symbol, held)]
     if analysis.slips:
         blocks += _slip_blocks(analysis)
-    blocks.append(Details("All speeds as a table", [_table(analysis)]))
-    return Section("speed", "Speed over time", blocks)
+    blocks.append(Details(say("All speeds as a table"), [_table(analysis)]))
+    return Section("speed", say("Speed over time"), blocks)
 
 
 def _profiles(run: MeasuredRun) -> tuple[SpeedProfile, ...]:
@@ -69,7 +70,9 @@ def _scale(si_symbol: str) -> tuple[float, str]:
 
 
 def _of_what(shaft: str, si_symbol: str) -> str:
-    return "the train" if si_symbol == "m/s" else f"the {shaft} shaft" if shaft else "a shaft"
+    return (
+        say("the train") if si_symbol == "m/s" else say("the {shaft} shaft", shaft=shaft) if shaft else say("a shaft")
+    )
 
 
 # ---------------------------------------------------------------- sentences
@@ -81,24 +84,39 @@ def _said(by_teller: Mapping[tuple[str, str, str], Held]) -> Iterator[str]:
         if teller == "lines":
             yield from (_of_lines(run, profile) for run, profile in held[:MOST_SENTENCES])
             if len(held) > MOST_SENTENCES:
-                yield f"So it is in {len(held) - MOST_SENTENCES} more runs; the table has them all."
+                yield say(
+                    "So it is in {most_sentences} more runs; the table has them all.",
+                    most_sentences=len(held) - MOST_SENTENCES,
+                )
             continue
         factor, unit = _scale(si_symbol)
         low = min(float(profile.speed.min()) for _, profile in held) * factor
         high = max(float(profile.speed.max()) for _, profile in held) * factor
-        kind = _KINDS[held[0][1].source].capitalize()
-        words = f"{kind} {teller} tells the speed of {_of_what(shaft, si_symbol)} in {_counted(held)}, "
-        words += "which stands" if low == high == 0.0 else pretty_signs(f"{low:.4g} to {high:.4g} {unit}")
+        kind = say(_KINDS[held[0][1].source]).capitalize()
+        words = say(
+            "{kind} {teller} tells the speed of {of_what} in {counted}, ",
+            kind=kind,
+            teller=teller,
+            of_what=_of_what(shaft, si_symbol),
+            counted=_counted(held),
+        )
+        words += (
+            say("which stands")
+            if low == high == 0.0
+            else pretty_signs(say("{low:.4g} to {high:.4g} {unit}", low=low, high=high, unit=unit))
+        )
         errors = [_relative_error(profile) for _, profile in held if profile.error is not None]
         errors = [error for error in errors if np.isfinite(error)]
         if errors and not low == high == 0.0:
-            words += f"; a value's standard error is {_percent(max(errors))}"
-            words += ", by the scatter of its edges" if held[0][1].source == "tacho" else ", by its own scatter"
+            words += say("; a value's standard error is {percent}", percent=_percent(max(errors)))
+            words += (
+                say(", by the scatter of its edges") if held[0][1].source == "tacho" else say(", by its own scatter")
+            )
         yield f"{words}."
 
 
 def _counted(held: Held) -> str:
-    return f"{len(held)} runs" if len(held) > 1 else f"run {held[0][0].name}"
+    return say("{n_held} runs", n_held=len(held)) if len(held) > 1 else say("run {name}", name=held[0][0].name)
 
 
 def _relative_error(profile: SpeedProfile) -> float:
@@ -109,25 +127,35 @@ def _relative_error(profile: SpeedProfile) -> float:
 
 
 def _percent(part: float) -> str:
-    return "less than 0.01 %" if part < 1e-4 else f"{100.0 * part:.2g} %"
+    return say("less than 0.01 %") if part < 1e-4 else f"{100.0 * part:.2g} %"
 
 
 def _of_lines(run: MeasuredRun, profile: SpeedProfile) -> str:
     factor, unit = _scale(profile.si_symbol)
     told = any(other.source != "lines" for other in _profiles(run))
-    beside = "beside its channels" if told else "which no channel tells"
-    words = f"The motor's speed in run {run.name}, {beside}, is read from the {profile.channel}: "
-    words += f"{factor * float(profile.speed.min()):.4g} to {factor * float(profile.speed.max()):.4g} {unit}"
+    beside = say("beside its channels") if told else say("which no channel tells")
+    words = say(
+        "The motor's speed in run {name}, {beside}, is read from the {channel}: ",
+        name=run.name,
+        beside=beside,
+        channel=profile.channel,
+    )
+    words += say(
+        "{speed:.4g} to {speed_2:.4g} {unit}",
+        speed=factor * float(profile.speed.min()),
+        speed_2=factor * float(profile.speed.max()),
+        unit=unit,
+    )
     if profile.confidence is not None:
-        words += f", median confidence {float(np.median(profile.confidence)):.2f}"
+        words += say(", median confidence {median:.2f}", median=float(np.median(profile.confidence)))
     if profile.error is not None:
-        words += f", standard error {_percent(_relative_error(profile))}"
+        words += say(", standard error {percent}", percent=_percent(_relative_error(profile)))
     share = 1.0 if run.span_s is None else profile.known_share(*run.span_s)
-    words += f", known in {100.0 * share:.0f} % of the run"
+    words += say(", known in {share:.0f} % of the run", share=100.0 * share)
     others = [other for other in _profiles(run) if other.source != "lines" and other.shaft == profile.shaft]
     off = _off(profile, others[0]) if others else None
     if off is not None:
-        words += f"; it lies {100.0 * off:.2g} % (rms) beside {others[0].channel}"
+        words += say("; it lies {off:.2g} % (rms) beside {channel}", off=100.0 * off, channel=others[0].channel)
     return f"{words}."
 
 
@@ -142,20 +170,29 @@ def _off(profile: SpeedProfile, other: SpeedProfile) -> float | None:
 
 def _not_found(runs: Sequence[MeasuredRun]) -> Iterator[str]:
     for run in runs:
-        known = "Run" if _profiles(run) else "The speed is not known in run"
+        known = say("Run") if _profiles(run) else say("The speed is not known in run")
         yield f"{known} {run.name}: {'; '.join(_reasons(run))}."
 
 
 def _faults(runs: Sequence[MeasuredRun]) -> Iterator[str]:
     found = [
-        pretty_unit(f"Run {run.name}, {profile.channel}: {'; '.join(profile.faults)}.")
+        pretty_unit(
+            say(
+                "Run {name}, {channel}: {faults}.",
+                name=run.name,
+                channel=profile.channel,
+                faults="; ".join(profile.faults),
+            )
+        )
         for run in runs
         for profile in _profiles(run)
         if profile.faults
     ]
     yield from found[:MOST_FAULTS]
     if len(found) > MOST_FAULTS:
-        yield f"{len(found) - MOST_FAULTS} more speeds have faults, which stand under quality."
+        yield say(
+            "{most_faults} more speeds have faults, which stand under quality.", most_faults=len(found) - MOST_FAULTS
+        )
 
 
 # ---------------------------------------------------------------- figures
@@ -164,7 +201,7 @@ def _faults(runs: Sequence[MeasuredRun]) -> Iterator[str]:
 def _figures(teller: str, shaft: str, si_symbol: str, held: Held) -> Iterator[Figure]:
     """Speed over time of all runs; of lines their confidence too."""
     factor, unit = _scale(si_symbol)
-    label = "Train speed" if si_symbol == "m/s" else f"Speed of {_of_what(shaft, si_symbol)}"
+    label = say("Train speed") if si_symbol == "m/s" else say("Speed of {of_what}", of_what=_of_what(shaft, si_symbol))
     elements: list[Element] = []
     drawn = factor * np.concatenate([profile.speed for _, profile in held])
     visible = VISIBLE * float(np.ptp(drawn)) if len(held) <= MOST_BANDS else float("inf")
@@ -172,23 +209,25 @@ def _figures(teller: str, shaft: str, si_symbol: str, held: Held) -> Iterator[Fi
         elements += _drawn(run, profile, factor, number % SERIES_SLOTS, visible)
     lines = teller == "lines"
     banded = any(isinstance(element, Band) for element in elements)
-    caption = "Read from the lines of the drive's orders." if lines else "As the channel tells it."
-    caption += f" The band is {SIGMAS:g} standard errors to each side." if banded else ""
+    caption = say("Read from the lines of the drive's orders.") if lines else say("As the channel tells it.")
+    caption += say(" The band is {sigmas:g} standard errors to each side.", sigmas=SIGMAS) if banded else ""
     if any(profile.unknown for _, profile in held):
-        caption += " Where a trace breaks off, the speed is not known."
-    title = "Speed over time, from lines" if lines else f"Speed over time, channel {teller}"
-    time = Axis("Time from the start of the run", "s")
+        caption += say(" Where a trace breaks off, the speed is not known.")
+    title = say("Speed over time, from lines") if lines else say("Speed over time, channel {teller}", teller=teller)
+    time = Axis(say("Time from the start of the run"), "s")
     yield Figure(slug("speed", teller), title, caption, time, Axis(label, unit), elements, height=320)
     if lines:
         traces = [
-            Line(*_broken(profile, profile.confidence), f"run {run.name}", color=number % SERIES_SLOTS)
+            Line(*_broken(profile, profile.confidence), say("run {name}", name=run.name), color=number % SERIES_SLOTS)
             for number, (run, profile) in enumerate(held)
             if profile.confidence is not None
         ]
         if traces:
-            words = "Probability that the speed is read from the right lines, by how well others would fit."
-            axis = Axis("Confidence", limits=(0.0, 1.05))
-            yield Figure("speed-confidence", "How sure the speed from lines is", words, time, axis, traces, height=200)
+            words = say("Probability that the speed is read from the right lines, by how well others would fit.")
+            axis = Axis(say("Confidence"), limits=(0.0, 1.05))
+            yield Figure(
+                "speed-confidence", say("How sure the speed from lines is"), words, time, axis, traces, height=200
+            )
 
 
 def _drawn(run: MeasuredRun, profile: SpeedProfile, factor: float, slot: int, visible: float) -> list[Element]:
@@ -198,12 +237,19 @@ def _drawn(run: MeasuredRun, profile: SpeedProfile, factor: float, slot: int, vi
     if profile.error is not None:
         _, half = _broken(profile, SIGMAS * factor * profile.error)
         if np.nanmax(half) > visible:
-            found.append(Band(times, values - half, values + half, f"run {run.name}, error", color=slot))
-    found.append(Line(times, values, f"run {run.name}", color=slot))
+            found.append(Band(times, values - half, values + half, say("run {name}, error", name=run.name), color=slot))
+    found.append(Line(times, values, say("run {name}", name=run.name), color=slot))
     others = [other for other in _profiles(run) if other.source != "lines" and other.shaft == profile.shaft]
     if profile.source == "lines" and others:
         beside = _broken(others[0], factor * np.abs(others[0].speed))
-        found.append(Line(*beside, f"run {run.name}, {others[0].channel}", style="dashed", color=slot))
+        found.append(
+            Line(
+                *beside,
+                say("run {name}, {channel}", name=run.name, channel=others[0].channel),
+                style="dashed",
+                color=slot,
+            )
+        )
     return found
 
 
@@ -229,15 +275,24 @@ def _slip_blocks(analysis: Analysis) -> list[Block]:
     one = len({(item.shaft_channel, item.train_channel) for _, item in held}) == 1
     for number, (run, item) in enumerate(held):
         if item.slip is not None:
-            name = f"run {run}" if one else f"run {run}, {item.shaft_channel} against {item.train_channel}"
+            name = (
+                say("run {run}", run=run)
+                if one
+                else say(
+                    "run {run}, {shaft_channel} against {train_channel}",
+                    run=run,
+                    shaft_channel=item.shaft_channel,
+                    train_channel=item.train_channel,
+                )
+            )
             traces.append(Line(item.slip.times_s, 100.0 * item.slip.slip, name, color=number % SERIES_SLOTS))
     if traces:
-        caption = (
+        caption = say(
             "Rim speed of the wheel over the train's, minus one. A wrong wheel diameter or a wrong scale of either "
             "speed moves the whole trace."
         )
-        time, axis = Axis("Time from the start of the run", "s"), Axis("Slip", "%")
-        figure = Figure("slip", "Slip of the wheels over time", caption, time, axis, traces, height=280)
+        time, axis = Axis(say("Time from the start of the run"), "s"), Axis(say("Slip"), "%")
+        figure = Figure("slip", say("Slip of the wheels over time"), caption, time, axis, traces, height=280)
         found.append(FigureBlock(figure, analysis.campaign.origin))
     return found
 
@@ -259,25 +314,41 @@ def _slip_words(held: Sequence[tuple[str, RunSlip]]) -> Iterator[str]:
             kinds = joined([f"{sum(e.kind == kind for e in slip.events)} × {kind}" for kind in _kinds(slip)])
             peak = pretty_signs(f"{100.0 * worst.peak:+.2g} %")
             yield (
-                f"Run {run}: the wheels lose adhesion ({kinds}, by {item.shaft_channel} against {item.train_channel}), "
-                f"at worst {peak} beside the usual slip, from {worst.first_s:.1f} s to {worst.last_s:.1f} s."
+                say(
+                    "Run {run}: the wheels lose adhesion ({kinds}, by {shaft_channel} against "
+                    "{train_channel}), at worst {peak} beside the usual slip, from {first_s:.1f} s "
+                    "to {last_s:.1f} s.",
+                    run=run,
+                    kinds=kinds,
+                    shaft_channel=item.shaft_channel,
+                    train_channel=item.train_channel,
+                    peak=peak,
+                    first_s=worst.first_s,
+                    last_s=worst.last_s,
+                )
             )
     if told:
         usual = [100.0 * slip.usual for _, _, slip in told]
-        span = f"{min(usual):+.2f} %" + (f" to {max(usual):+.2f} %" if len(usual) > 1 else "")
+        span = f"{min(usual):+.2f} %" + (say(" to {usual:+.2f} %", usual=max(usual)) if len(usual) > 1 else "")
         errors = [float(np.median(slip.error)) for _, _, slip in told if slip.error is not None]
-        known = f", one value ± {_percent(max(errors))} (1 σ)" if errors else ""
-        calm = "" if any(slip.events for _, _, slip in told) else "; adhesion is never lost"
+        known = say(", one value ± {percent} (1 σ)", percent=_percent(max(errors))) if errors else ""
+        calm = "" if any(slip.events for _, _, slip in told) else say("; adhesion is never lost")
         yield (
-            f"The usual slip of {_runs_in_words([run for run, _, _ in told])} is {pretty_signs(span)}{known}{calm}. "
-            "Creep, wear of the wheel and a wrong scale of either speed look alike in it."
+            say(
+                "The usual slip of {runs_in} is {span}{known}{calm}. Creep, wear of the wheel and a "
+                "wrong scale of either speed look alike in it.",
+                runs_in=_runs_in_words([run for run, _, _ in told]),
+                span=pretty_signs(span),
+                known=known,
+                calm=calm,
+            )
         )
-    yield from (f"Run {run}: {item.reason}." for run, item in held if item.slip is None)
+    yield from (say("Run {run}: {reason}.", run=run, reason=item.reason) for run, item in held if item.slip is None)
 
 
 def _runs_in_words(runs: Sequence[str]) -> str:
     names = list(dict.fromkeys(runs))
-    return f"run {names[0]}" if len(names) == 1 else f"{len(names)} runs"
+    return say("run {names}", names=names[0]) if len(names) == 1 else say("{n_names} runs", n_names=len(names))
 
 
 def _kinds(slip: WheelSlip) -> list[str]:
@@ -289,21 +360,21 @@ def _kinds(slip: WheelSlip) -> list[str]:
 
 def _table(analysis: Analysis) -> Table:
     columns = [
-        Column("run", "Run"),
-        Column("channel", "Channel"),
-        Column("source", "Source"),
-        Column("shaft", "Shaft"),
-        Column("mean", "Mean", "", 1, "number"),
-        Column("min", "Least", "", 1, "number"),
-        Column("max", "Most", "", 1, "number"),
-        Column("unit", "Unit"),
+        Column("run", say("Run")),
+        Column("channel", say("Channel")),
+        Column("source", say("Source")),
+        Column("shaft", say("Shaft")),
+        Column("mean", say("Mean"), "", 1, "number"),
+        Column("min", say("Least"), "", 1, "number"),
+        Column("max", say("Most"), "", 1, "number"),
+        Column("unit", say("Unit")),
         Column("error", "±", "1 σ", 3, "number"),
-        Column("confidence", "Confidence", "", 2, "number"),
-        Column("known_percent", "Known", "% of the run", 0, "number"),
-        Column("remarks", "Remarks"),
+        Column("confidence", say("Confidence"), "", 2, "number"),
+        Column("known_percent", say("Known"), say("% of the run"), 0, "number"),
+        Column("remarks", say("Remarks")),
     ]
     rows = [[_cell(row, column.key) for column in columns] for row in analysis.tables["speeds"].to_dict("records")]
-    caption = "Speeds by run and source; stated ones are the campaign's"
+    caption = say("Speeds by run and source; stated ones are the campaign's")
     return Table("speeds", caption, columns, rows, origin=analysis.campaign.origin)
 
 

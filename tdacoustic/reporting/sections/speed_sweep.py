@@ -11,13 +11,14 @@ from tdacoustic.drive import GearState, SpeedSweep
 from tdacoustic.gears import Branch, coexisting
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import by_speed, hertz, law_words, sentence, significant
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["speed_sweep", "sweep_words"]
 
-METHOD = (
+METHOD = mark(
     "The train gets slowly faster, then slowly slower, at the torque of the fleet's law: each speed starts from the "
     "motion of the speed before. Where the two ways end in different motions, both are stable, and the history decides "
     "which one the gears take. The largest Floquet multiplier is of the motion that repeats with each mesh period, "
@@ -34,7 +35,7 @@ def speed_sweep(result: FleetPrediction) -> Section | None:
     if sweep is None:
         return None
     blocks: list[Block] = [
-        Paragraph(f"{METHOD} {_range_words(result, sweep)}"),
+        Paragraph(f"{say(METHOD)} {_range_words(result, sweep)}"),
         Sentences([sentence(words) for words in _findings(sweep)]),
     ]
     if not _is_at_rest(sweep):
@@ -45,7 +46,7 @@ def speed_sweep(result: FleetPrediction) -> Section | None:
     stretches = list(_stretches(sweep))
     if stretches:
         blocks.append(_table(stretches))
-    return Section("speed-sweep", "Speed sweep", blocks)
+    return Section("speed-sweep", say("Speed sweep"), blocks)
 
 
 def sweep_words(result: FleetPrediction) -> str:
@@ -54,7 +55,12 @@ def sweep_words(result: FleetPrediction) -> str:
     if sweep is None:
         return ""
     slowest, fastest = (significant(sweep.train_speed_km_h[end]) for end in (0, -1))
-    return f"speed sweep from {slowest} to {fastest} km/h: {'; '.join(_findings(sweep))}"
+    return say(
+        "speed sweep from {slowest} to {fastest} km/h: {findings}",
+        slowest=slowest,
+        fastest=fastest,
+        findings="; ".join(_findings(sweep)),
+    )
 
 
 def _is_at_rest(sweep: SpeedSweep) -> bool:
@@ -78,43 +84,61 @@ def _differ(sweep: SpeedSweep) -> tuple[Mask, Mask]:
 
 def _range_words(result: FleetPrediction, sweep: SpeedSweep) -> str:
     speeds, mesh = sweep.train_speed_km_h, sweep.up.mesh_hz
-    return (
-        f"{len(speeds)} speeds from {significant(speeds[0])} to {significant(speeds[-1])} km/h each way (mesh "
-        f"{hertz(float(mesh[0]))} to {hertz(float(mesh[-1]))}), torque {law_words(result.fleet)}."
+    return say(
+        "{n_speeds} speeds from {significant} to {significant_2} km/h each way (mesh {hertz} to "
+        "{hertz_2}), torque {law}.",
+        n_speeds=len(speeds),
+        significant=significant(speeds[0]),
+        significant_2=significant(speeds[-1]),
+        hertz=hertz(float(mesh[0])),
+        hertz_2=hertz(float(mesh[-1])),
+        law=law_words(result.fleet),
     )
 
 
 def _findings(sweep: SpeedSweep) -> list[str]:
     if _is_at_rest(sweep):
-        return ["without torque nothing moves at any speed"]
+        return [say("without torque nothing moves at any speed")]
     up, down = sweep.up, sweep.down
     twice, open_ended = _differ(sweep)
-    found = [f"two motions are stable {_places(sweep, twice)}"] if twice.any() else ["the two ways end in one motion"]
+    found = (
+        [say("two motions are stable {places}", places=_places(sweep, twice))]
+        if twice.any()
+        else [say("the two ways end in one motion")]
+    )
     if open_ended.any():
-        found[0] += ", judged where both ways repeat"
+        found[0] += say(", judged where both ways repeat")
         found.append(_open_words(sweep, open_ended))
     apart = _separate(up) | _separate(down)[::-1]
-    found.append(f"teeth separate {_places(sweep, apart)}" if apart.any() else "teeth stay in contact at every speed")
+    found.append(
+        say("teeth separate {places}", places=_places(sweep, apart))
+        if apart.any()
+        else say("teeth stay in contact at every speed")
+    )
     several = (_repeats(up) != 1) | (_repeats(down)[::-1] != 1)
     if several.any():
-        found.append(f"the motion does not repeat with each mesh period {_places(sweep, several)}")
+        found.append(say("the motion does not repeat with each mesh period {places}", places=_places(sweep, several)))
     best = max((up, down), key=lambda branch: float(branch.dte_pp_m.max()))
     peak = int(best.dte_pp_m.argmax())
-    way = "" if not (twice | open_ended).any() else " on the way up" if best is up else " on the way down"
-    largest = f"{significant(1e6 * float(best.dte_pp_m[peak]))} µm at {hertz(float(best.mesh_hz[peak]))}"
-    return [*found, f"the largest DTE is {largest}{way}"]
+    way = "" if not (twice | open_ended).any() else say(" on the way up") if best is up else say(" on the way down")
+    largest = say(
+        "{significant} µm at {hertz}",
+        significant=significant(1000000.0 * float(best.dte_pp_m[peak])),
+        hertz=hertz(float(best.mesh_hz[peak])),
+    )
+    return [*found, say("the largest DTE is {largest}{way}", largest=largest, way=way)]
 
 
 def _open_words(sweep: SpeedSweep, open_ended: Mask) -> str:
     one_way = (_repeats(sweep.up) == 0) != (_repeats(sweep.down)[::-1] == 0)
-    text = f"at {_counted(open_ended)} a motion does not repeat"
+    text = say("at {counted} a motion does not repeat", counted=_counted(open_ended))
     if one_way.any():
-        text += f", at {_counted(one_way)} on one way only, where two motions may be stable too"
+        text += say(", at {counted} on one way only, where two motions may be stable too", counted=_counted(one_way))
     return text
 
 
 def _counted(mask: Mask) -> str:
-    return f"{int(mask.sum())} speed{'s' if mask.sum() > 1 else ''}"
+    return say("{mask} speed{value}", mask=int(mask.sum()), value="s" if mask.sum() > 1 else "")
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:
@@ -128,9 +152,13 @@ def _places(sweep: SpeedSweep, mask: Mask) -> str:
     speeds, runs = sweep.train_speed_km_h, _runs(mask)
     if len(runs) > 3:
         first, last = speeds[runs[0][0]], speeds[runs[-1][1]]
-        return f"at {int(mask.sum())} speeds between {first:.4g} and {last:.4g} km/h"
+        return say(
+            "at {mask} speeds between {first:.4g} and {last:.4g} km/h", mask=int(mask.sum()), first=first, last=last
+        )
     words = [
-        f"at {speeds[start]:.4g} km/h" if start == end else f"from {speeds[start]:.4g} to {speeds[end]:.4g} km/h"
+        say("at {speeds:.4g} km/h", speeds=speeds[start])
+        if start == end
+        else say("from {speeds:.4g} to {speeds_2:.4g} km/h", speeds=speeds[start], speeds_2=speeds[end])
         for start, end in runs
     ]
     return joined(words)
@@ -144,10 +172,12 @@ def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
     twice, _ = _differ(sweep)
     if twice.any():
         y = np.concatenate([sweep.up.dte_pp_m[twice], sweep.down.dte_pp_m[::-1][twice]])
-        elements.append(Markers(np.tile(sweep.up.mesh_hz[twice], 2), 1e6 * y, "two motions", symbol="square", color=6))
+        elements.append(
+            Markers(np.tile(sweep.up.mesh_hz[twice], 2), 1e6 * y, say("two motions"), symbol="square", color=6)
+        )
     for name, symbol, several in (
-        ("repeats after several mesh periods", "cross", True),
-        ("does not repeat", "x", False),
+        (say("repeats after several mesh periods"), "cross", True),
+        (say("does not repeat"), "x", False),
     ):
         held = [(b, np.asarray(_repeats(b) > 1 if several else _repeats(b) == 0)) for b in (sweep.up, sweep.down)]
         if any(mask.any() for _, mask in held):
@@ -160,12 +190,15 @@ def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
     elements += [Rule(float(value), f"{value:.0f} Hz") for value in natural if low < value < high]
     return Figure(
         "sweep-dte",
-        "Dynamic transmission error over the speed sweep",
-        "Peak to peak, of a motion that does not repeat that of its record. Broken vertical lines are natural "
-        "frequencies of the linear system on seats that do not move; the nth harmonic of the mesh meets one already "
-        "at an nth of it. Diamonds are the conditions, each computed by itself from teeth in contact.",
-        Axis("Mesh frequency", "Hz", limits=(low, high)),
-        Axis("DTE", "µm", note="peak to peak"),
+        say("Dynamic transmission error over the speed sweep"),
+        say(
+            "Peak to peak, of a motion that does not repeat that of its record. Broken vertical lines are natural "
+            "frequencies of the linear system on seats that do not move; the nth harmonic of the mesh meets one "
+            "already "
+            "at an nth of it. Diamonds are the conditions, each computed by itself from teeth in contact."
+        ),
+        Axis(say("Mesh frequency"), "Hz", limits=(low, high)),
+        Axis(say("DTE"), "µm", note=say("peak to peak")),
         elements,
         height=440,
     )
@@ -183,20 +216,25 @@ def _multipliers(sweep: SpeedSweep) -> Figure:
     elements: list[Element] = [
         Line(sweep.up.mesh_hz, sweep.up.floquet_max, "up", color=0),
         Line(sweep.down.mesh_hz, sweep.down.floquet_max, "down", style="dashed", color=1),
-        Line(np.array([low, high]), np.array([1.0, 1.0]), "limit of stability", style="dotted", color=7),
+        Line(np.array([low, high]), np.array([1.0, 1.0]), say("limit of stability"), style="dotted", color=7),
     ]
     for branch, name, color in ((sweep.up, "up", 0), (sweep.down, "down", 1)):
         held = _alone(branch.floquet_max)
         if held.any():
-            points = Markers(branch.mesh_hz[held], branch.floquet_max[held], f"{name}, between gaps", color=color)
+            points = Markers(
+                branch.mesh_hz[held], branch.floquet_max[held], say("{name}, between gaps", name=name), color=color
+            )
             elements.append(points)
     return Figure(
         "sweep-floquet",
-        "Largest Floquet multiplier over the speed sweep",
-        "Of the motion that repeats with each mesh period, where one was found, else of the one that repeats after "
-        "several; above 1 it is unstable, and the motion of the figure above is another. In a gap neither was found.",
-        Axis("Mesh frequency", "Hz", limits=(low, high)),
-        Axis("Largest multiplier"),
+        say("Largest Floquet multiplier over the speed sweep"),
+        say(
+            "Of the motion that repeats with each mesh period, where one was found, else of the one that repeats after "
+            "several; above 1 it is unstable, and the motion of the figure above is another. In a gap neither "
+            "was found."
+        ),
+        Axis(say("Mesh frequency"), "Hz", limits=(low, high)),
+        Axis(say("Largest multiplier")),
         elements,
         height=300,
     )
@@ -211,10 +249,10 @@ def _alone(values: NDArray[np.float64]) -> Mask:
 def _contact(sweep: SpeedSweep) -> Figure:
     return Figure(
         "sweep-contact",
-        "Part of the time in which teeth touch, over the speed sweep",
+        say("Part of the time in which teeth touch, over the speed sweep"),
         "",
-        Axis("Mesh frequency", "Hz", limits=(float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1]))),
-        Axis("Teeth touch", "% of time"),
+        Axis(say("Mesh frequency"), "Hz", limits=(float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1]))),
+        Axis(say("Teeth touch"), say("% of time")),
         [
             Line(sweep.up.mesh_hz, 100.0 * sweep.up.contact_part, "up", color=0),
             Line(sweep.down.mesh_hz, 100.0 * sweep.down.contact_part, "down", style="dashed", color=1),
@@ -226,13 +264,13 @@ def _contact(sweep: SpeedSweep) -> Figure:
 def _stretches(sweep: SpeedSweep) -> Iterator[list[Cell]]:
     """Rows of the table: what happens from which speed to which."""
     mesh, speeds = sweep.up.mesh_hz, sweep.train_speed_km_h
-    found: list[tuple[str, str, Mask]] = [("both", "two motions are stable", _differ(sweep)[0])]
+    found: list[tuple[str, str, Mask]] = [("both", say("two motions are stable"), _differ(sweep)[0])]
     for name, branch, order in (("up", sweep.up, 1), ("down", sweep.down, -1)):
         repeats = _repeats(branch)[::order]
-        found.append((name, "teeth separate", _separate(branch)[::order]))
+        found.append((name, say("teeth separate"), _separate(branch)[::order]))
         for periods in sorted(set(repeats[repeats > 1].tolist())):
-            found.append((name, f"repeats after {periods} mesh periods", repeats == periods))
-        found.append((name, "does not repeat", repeats == 0))
+            found.append((name, say("repeats after {periods} mesh periods", periods=periods), repeats == periods))
+        found.append((name, say("does not repeat"), repeats == 0))
     for way, what, mask in found:
         for start, end in _runs(mask):
             yield [way, what, speeds[start], speeds[end], float(mesh[start]), float(mesh[end]), end - start + 1]
@@ -240,12 +278,12 @@ def _stretches(sweep: SpeedSweep) -> Iterator[list[Cell]]:
 
 def _table(rows: list[list[Cell]]) -> Table:
     columns = (
-        Column("direction", "Way"),
-        Column("what", "What"),
-        Column("from_km_h", "From", "km/h", 1, "number"),
-        Column("to_km_h", "To", "km/h", 1, "number"),
-        Column("from_mesh_hz", "From", "mesh, Hz", 1, "number"),
-        Column("to_mesh_hz", "To", "mesh, Hz", 1, "number"),
-        Column("speeds", "Speeds", "", 0, "number"),
+        Column("direction", say("Way")),
+        Column("what", say("What")),
+        Column("from_km_h", say("From"), "km/h", 1, "number"),
+        Column("to_km_h", say("To"), "km/h", 1, "number"),
+        Column("from_mesh_hz", say("From"), say("mesh, Hz"), 1, "number"),
+        Column("to_mesh_hz", say("To"), say("mesh, Hz"), 1, "number"),
+        Column("speeds", say("Speeds"), "", 0, "number"),
     )
-    return Table("sweep-stretches", "What happens at which speeds", columns, rows, origin="calculated")
+    return Table("sweep-stretches", say("What happens at which speeds"), columns, rows, origin="calculated")

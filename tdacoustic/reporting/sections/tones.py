@@ -18,6 +18,7 @@ from tdacoustic.reporting.document import (
     Sentences,
     Table,
 )
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.tones_figures import audibility_figure, criterion_figure, run_up_figures
@@ -44,17 +45,19 @@ def tones(analysis: Analysis) -> Section | None:
         blocks.append(Sentences([loudest for loudest, *_ in said]))
     others = [sentence for _, *rest in said for sentence in rest]
     if others:
-        blocks.append(Details(f"The other microphones, {len(others)} sentences", [Sentences(others)]))
+        blocks.append(
+            Details(say("The other microphones, {n_others} sentences", n_others=len(others)), [Sentences(others)])
+        )
     blocks += _figures(analysis, found, microphones)
-    blocks.append(in_sight(_table(analysis, found), "How tonal each microphone is"))
+    blocks.append(in_sight(_table(analysis, found), say("How tonal each microphone is")))
     doubts = _notes(found.ratings)
     if doubts:
-        blocks.append(Details("What to know about these ratings", [Sentences(doubts)]))
+        blocks.append(Details(say("What to know about these ratings"), [Sentences(doubts)]))
     blocks += _more_tables(analysis, found)
     limits = [f"{method}: {limit}" for method, of in found.limits for limit in of]
     if limits:
-        blocks.append(Details("What the methods cannot do, and how far they are known here", [Sentences(limits)]))
-    return Section("tones", "Is it tonal?", blocks)
+        blocks.append(Details(say("What the methods cannot do, and how far they are known here"), [Sentences(limits)]))
+    return Section("tones", say("Is it tonal?"), blocks)
 
 
 # ---------------------------------------------------------------- the answer
@@ -63,13 +66,13 @@ def tones(analysis: Analysis) -> Section | None:
 def _verdict(rating: RunTonality | None) -> str:
     """``tonal``, ``not tonal``, ``open`` within the uncertainty; ``run-up``, which has none; or ``not rated``."""
     if rating is None or rating.mean_audibility_db is None:
-        return "not rated"
+        return say("not rated")
     if rating.run_up:
         return "run-up"
     mean, around = rating.mean_audibility_db, rating.uncertainty_db or 0.0
     if mean - around > 0.0:
         return "tonal"
-    return "open" if mean + around > 0.0 else "not tonal"
+    return "open" if mean + around > 0.0 else say("not tonal")
 
 
 def _rated_runs(analysis: Analysis, condition: str) -> list[MeasuredRun]:
@@ -83,30 +86,35 @@ def _answer(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> 
     for condition in analysis.campaign.conditions():
         runs = _rated_runs(analysis, condition)
         verdicts = {_verdict(found.rating(run.name, name, ISO)) for run in runs for name in microphones}
-        for word in ("tonal", "open", "not tonal", "run-up", "not rated"):
+        for word in ("tonal", "open", say("not tonal"), "run-up", say("not rated")):
             if word in verdicts:
                 tonal.setdefault(word, []).append(condition)
                 break
         if any(tone.prominent and tone.condition == condition and tone.channel in microphones for tone in found.tones):
             prominent.append(condition)
     words = {
-        "tonal": "tonal at a receiver at least",
-        "open": "open, within the uncertainty of the audibility",
-        "not tonal": "not tonal",
-        "run-up": "rated spectrum by spectrum, for the speed changes, and without a verdict",
-        "not rated": "not rated",
+        "tonal": say("tonal at a receiver at least"),
+        "open": say("open, within the uncertainty of the audibility"),
+        "not tonal": say("not tonal"),
+        "run-up": say("rated spectrum by spectrum, for the speed changes, and without a verdict"),
+        "not rated": say("not rated"),
     }
     parts = [f"{_conditions(tonal[word])}: {words[word]}" for word in words if word in tonal]
-    answer = f"By {ISO} (tonal: a mean audibility above 0 dB): {'; '.join(parts)}."
+    answer = say("By {iso} (tonal: a mean audibility above 0 dB): {parts}.", iso=ISO, parts="; ".join(parts))
     if prominent:
-        return f"{answer} By {ECMA} a tone is prominent in {_conditions(prominent)}."
+        return say(
+            "{answer} By {ecma} a tone is prominent in {conditions}.",
+            answer=answer,
+            ecma=ECMA,
+            conditions=_conditions(prominent),
+        )
     if not any(tone.prominent is not None for tone in found.tones):
         return answer
-    return f"{answer} No tone is prominent by {ECMA}."
+    return say("{answer} No tone is prominent by {ecma}.", answer=answer, ecma=ECMA)
 
 
 def _conditions(names: Sequence[str]) -> str:
-    return f"condition{'s' if len(names) > 1 else ''} {joined(list(names))}"
+    return say("condition{value} {list}", value="s" if len(names) > 1 else "", list=joined(list(names)))
 
 
 def _sentences(analysis: Analysis, found: Tonality, microphones: Sequence[str]) -> Iterator[list[str]]:
@@ -130,22 +138,38 @@ def _of_receiver(found: Tonality, name: str, rated: Sequence[tuple[MeasuredRun, 
     known = [(run, rating) for run, rating in rated if rating.mean_audibility_db is not None]
     if not known:
         notes = [note.removeprefix("not rated, ") for _, rating in rated for note in rating.notes]
-        return f"not rated, {'; '.join(dict.fromkeys(notes))}."
+        return say("not rated, {fromkeys}.", fromkeys="; ".join(dict.fromkeys(notes)))
     run, rating = max(known, key=lambda pair: pair[1].mean_audibility_db or 0.0)
     if rating.run_up:
         return _of_run_up(found, run, name)
     verdicts = [_verdict(one) for _, one in known]
-    verdict = {"open": "open, within its uncertainty"}.get(_verdict(rating), _verdict(rating))
-    of_runs = f" in {verdicts.count('tonal')} of {len(known)} runs" if len(known) > 1 and verdict == "tonal" else ""
-    highest = ", run " + run.name + " highest" if len(known) > 1 else ""
-    mean = f"mean audibility {rating.mean_audibility_db:.1f} \N{PLUS-MINUS SIGN} {rating.uncertainty_db or 0.0:.1f} dB"
-    said = [f"{verdict}{of_runs}, {mean}{highest} (ISO/TS 20065)"]
+    verdict = {"open": say("open, within its uncertainty")}.get(_verdict(rating), _verdict(rating))
+    of_runs = (
+        say(" in {count} of {n_known} runs", count=verdicts.count("tonal"), n_known=len(known))
+        if len(known) > 1 and verdict == "tonal"
+        else ""
+    )
+    highest = say(", run ") + run.name + " highest" if len(known) > 1 else ""
+    mean = say(
+        "mean audibility {mean_audibility_db:.1f} ± {uncertainty_db:.1f} dB",
+        mean_audibility_db=rating.mean_audibility_db,
+        uncertainty_db=rating.uncertainty_db or 0.0,
+    )
+    said = [
+        say(
+            "{verdict}{of_runs}, {mean}{highest} (ISO/TS 20065)",
+            verdict=verdict,
+            of_runs=of_runs,
+            mean=mean,
+            highest=highest,
+        )
+    ]
     strongest = _most_audible(found.of(run.name, name, ISO))
     if strongest:
-        said.append(f"most audible {joined([_tone_words(tone) for tone in strongest])}")
+        said.append(say("most audible {tone}", tone=joined([_tone_words(tone) for tone in strongest])))
     din = found.rating(run.name, name, DIN)
     if din is not None and din.adjustment_db is not None:
-        said.append(f"tone adjustment {din.adjustment_db} dB (DIN 45681)")
+        said.append(say("tone adjustment {adjustment_db} dB (DIN 45681)", adjustment_db=din.adjustment_db))
     said.append(_prominent_words(found, run.name, name))
     return "; ".join(said) + "."
 
@@ -154,12 +178,18 @@ def _of_run_up(found: Tonality, run: MeasuredRun, name: str) -> str:
     hearing = found.hearing.get(run.name)
     rated = None if hearing is None else hearing.rated(name, ISO)
     if rated is None:
-        return "not rated."
+        return say("not rated.")
     audible = int((rated.decisive_db > 0.0).sum())
-    said = [f"a run-up, a tone is audible in {audible} of {rated.decisive_db.size} spectra (ISO/TS 20065)"]
+    said = [
+        say(
+            "a run-up, a tone is audible in {audible} of {size} spectra (ISO/TS 20065)",
+            audible=audible,
+            size=rated.decisive_db.size,
+        )
+    ]
     strongest = _most_audible(found.of(run.name, name, ISO))
     if strongest:
-        said.append(f"most audible {joined([_tone_words(tone) for tone in strongest])}")
+        said.append(say("most audible {tone}", tone=joined([_tone_words(tone) for tone in strongest])))
     smeared = next((note for note in _notes_on(found, run.name, name) if note.startswith("the speed changes")), None)
     return "; ".join([*said, *([smeared] if smeared else [])]) + "."
 
@@ -176,16 +206,16 @@ def _most_audible(held: Iterable[RunTone]) -> list[RunTone]:
 
 
 def _tone_words(tone: RunTone) -> str:
-    speed = f" at {tone.speed.words()}" if tone.speed is not None else ""
+    speed = say(" at {words}", words=tone.speed.words()) if tone.speed is not None else ""
     return f"{tone.frequency_hz:.0f} Hz{speed} ({_origin_words(tone)})"
 
 
 def _origin_words(tone: RunTone) -> str:
     """Order and owner in words; what nobody knows is said."""
     if tone.owner == "unassigned" and tone.excitation == "unknown":
-        return "origin unknown"
-    excitation = "order unknown" if tone.excitation == "unknown" else tone.excitation
-    owner = "owner unknown" if tone.owner == "unassigned" else tone.owner
+        return say("origin unknown")
+    excitation = say("order unknown") if tone.excitation == "unknown" else tone.excitation
+    owner = say("owner unknown") if tone.owner == "unassigned" else tone.owner
     return f"{excitation}, {owner}"
 
 
@@ -194,21 +224,29 @@ def _prominent_words(found: Tonality, run: str, channel: str) -> str:
     if not held:
         rating = found.rating(run, channel, ECMA)
         if rating is not None and rating.n_spectra:
-            return "no tone for ECMA-418-1"
-        return "ECMA-418-1 rates steady speeds alone"
+            return say("no tone for ECMA-418-1")
+        return say("ECMA-418-1 rates steady speeds alone")
     prominent = {round(tone.frequency_hz, 3): tone for tone in held if tone.prominent}
     if prominent:
         names = [_tone_words(tone) for tone in list(prominent.values())[:NAMED_TONES]]
-        more = f" and {len(prominent) - NAMED_TONES} more" if len(prominent) > NAMED_TONES else ""
-        return f"prominent by ECMA-418-1: {', '.join(names)}{more}"
+        more = (
+            say(" and {named_tones} more", named_tones=len(prominent) - NAMED_TONES)
+            if len(prominent) > NAMED_TONES
+            else ""
+        )
+        return say("prominent by ECMA-418-1: {names}{more}", names=", ".join(names), more=more)
     rated = [tone for tone in held if tone.value_db is not None]
     if not rated:
-        return "no ratio by ECMA-418-1"
+        return say("no ratio by ECMA-418-1")
     nearest = max(rated, key=lambda tone: (tone.value_db or 0.0) - tone.criterion_db)
     ratio = nearest.method.removeprefix(f"{ECMA} ")
-    return (
-        f"no tone prominent by ECMA-418-1 (nearest: {nearest.frequency_hz:.0f} Hz, {ratio} {nearest.value_db:.1f} dB "
-        f"of {nearest.criterion_db:.1f} dB)"
+    return say(
+        "no tone prominent by ECMA-418-1 (nearest: {frequency_hz:.0f} Hz, {ratio} {value_db:.1f} "
+        "dB of {criterion_db:.1f} dB)",
+        frequency_hz=nearest.frequency_hz,
+        ratio=ratio,
+        value_db=nearest.value_db,
+        criterion_db=nearest.criterion_db,
     )
 
 
@@ -239,7 +277,7 @@ def _figures(analysis: Analysis, found: Tonality, microphones: Sequence[str]) ->
         blocks.append(spectra[best][1])
         others = [block for index, (_, block) in enumerate(spectra) if index != best]
         if others:
-            blocks.append(Details(f"The same of {len(others)} more conditions", others))
+            blocks.append(Details(say("The same of {n_others} more conditions", n_others=len(others)), others))
     moving = [figure for run in tested_runs(analysis) for figure in run_up_figures(found, run.name, microphones, ISO)]
     return [*blocks, *(FigureBlock(figure, origin) for figure in moving)]
 
@@ -263,23 +301,23 @@ def _table(analysis: Analysis, found: Tonality) -> Table:
         return _tone_words(tones[0]) if tones else "none"
 
     columns: list[tuple[Column, Callable[[RunTonality], Cell]]] = [
-        (Column("condition", "Condition"), lambda rating: rating.condition),
-        (Column("run", "Run"), lambda rating: rating.run),
-        (Column("channel", "Microphone"), lambda rating: rating.channel),
-        (Column("verdict", "By ISO/TS 20065"), _verdict),
+        (Column("condition", say("Condition")), lambda rating: rating.condition),
+        (Column("run", say("Run")), lambda rating: rating.run),
+        (Column("channel", say("Microphone")), lambda rating: rating.channel),
+        (Column("verdict", say("By ISO/TS 20065")), _verdict),
         *_AUDIBILITY,
-        (Column("adjustment_db", "Adjustment", "DIN 45681, dB", 0, "number"), adjustment),
-        (Column("n_spectra", "Spectra", "", 0, "number"), lambda rating: rating.n_spectra),
-        (Column("most_audible", "Most audible"), strongest),
-        (Column("prominent", "Prominent by ECMA-418-1"), lambda rating: _prominent_cell(found, rating)),
+        (Column("adjustment_db", say("Adjustment"), say("DIN 45681, dB"), 0, "number"), adjustment),
+        (Column("n_spectra", say("Spectra"), "", 0, "number"), lambda rating: rating.n_spectra),
+        (Column("most_audible", say("Most audible")), strongest),
+        (Column("prominent", say("Prominent by ECMA-418-1")), lambda rating: _prominent_cell(found, rating)),
     ]
-    return item_table("tonality", "How tonal each microphone is", rated, columns, analysis.campaign.origin)
+    return item_table("tonality", say("How tonal each microphone is"), rated, columns, analysis.campaign.origin)
 
 
 def _prominent_cell(found: Tonality, rating: RunTonality) -> str:
     of_ecma = found.rating(rating.run, rating.channel, ECMA)
     if of_ecma is None or not of_ecma.n_spectra:
-        return "not rated"
+        return say("not rated")
     held = [tone for tone in found.tones if (tone.run, tone.channel) == (rating.run, rating.channel) and tone.prominent]
     return ", ".join(dict.fromkeys(f"{tone.frequency_hz:.0f} Hz" for tone in held)) or "none"
 
@@ -290,13 +328,13 @@ def _notes(ratings: Sequence[RunTonality]) -> list[str]:
     places: dict[str, list[str]] = {}
     for rating in rated:
         for note in rating.notes:
-            places.setdefault(note, []).append(f"run {rating.run}, {rating.channel}")
-    everywhere = {f"run {rating.run}, {rating.channel}" for rating in rated}
+            places.setdefault(note, []).append(say("run {run}, {channel}", run=rating.run, channel=rating.channel))
+    everywhere = {say("run {run}, {channel}", run=rating.run, channel=rating.channel) for rating in rated}
     said = []
     for note, held in places.items():
         own = list(dict.fromkeys(held))
-        where = "All" if len(own) >= MORE_THAN_ALL * len(everywhere) else "; ".join(own[:6])
-        more = f" and {len(own) - 6} more" if where != "All" and len(own) > 6 else ""
+        where = say("All") if len(own) >= MORE_THAN_ALL * len(everywhere) else "; ".join(own[:6])
+        more = say(" and {n_own} more", n_own=len(own) - 6) if where != "All" and len(own) > 6 else ""
         said.append(pretty_signs(f"{where}{more}: {note}."))
     return said
 
@@ -307,35 +345,39 @@ def _more_tables(analysis: Analysis, found: Tonality) -> list[Block]:
     classes = [rating for rating in found.ratings if rating.speed is not None and rating.method == ISO]
     if classes:
         columns: list[tuple[Column, Callable[[RunTonality], Cell]]] = [
-            (Column("run", "Run"), lambda rating: rating.run),
-            (Column("channel", "Microphone"), lambda rating: rating.channel),
-            (Column("speed", "Speed"), lambda rating: _speed(rating.speed)),
+            (Column("run", say("Run")), lambda rating: rating.run),
+            (Column("channel", say("Microphone")), lambda rating: rating.channel),
+            (Column("speed", say("Speed")), lambda rating: _speed(rating.speed)),
             *_AUDIBILITY,
-            (Column("n_spectra", "Spectra", "", 0, "number"), lambda rating: rating.n_spectra),
+            (Column("n_spectra", say("Spectra"), "", 0, "number"), lambda rating: rating.n_spectra),
         ]
-        table = item_table("tonality-classes", f"Audibility by speed class ({ISO})", classes, columns)
-        blocks.append(Details(f"Run-ups: {len(classes)} speed classes", [table]))
+        table = item_table("tonality-classes", say("Audibility by speed class ({iso})", iso=ISO), classes, columns)
+        blocks.append(Details(say("Run-ups: {n_classes} speed classes", n_classes=len(classes)), [table]))
     if found.tones:
-        blocks.append(Details(f"All {len(found.tones)} ratings of tones", [_tone_table(analysis, found.tones)]))
+        blocks.append(
+            Details(
+                say("All {n_tones} ratings of tones", n_tones=len(found.tones)), [_tone_table(analysis, found.tones)]
+            )
+        )
     return blocks
 
 
 def _tone_table(analysis: Analysis, held: Sequence[RunTone]) -> Table:
     columns: list[tuple[Column, Callable[[RunTone], Cell]]] = [
-        (Column("run", "Run"), lambda tone: tone.run),
-        (Column("channel", "Microphone"), lambda tone: tone.channel),
-        (Column("method", "Method"), lambda tone: tone.method),
-        (Column("speed", "Speed"), lambda tone: _speed(tone.speed)),
-        (Column("frequency_hz", "Frequency", "Hz", 1, "number"), lambda tone: tone.frequency_hz),
-        (Column("level_db", "Level", "dB re 20 µPa", 1, "number"), lambda tone: tone.level_db),
-        (Column("weighting", "Weighting"), lambda tone: tone.weighting),
-        (Column("value_db", "Value", "dB", 1, "number"), lambda tone: tone.value_db),
-        (Column("criterion_db", "Criterion", "dB", 1, "number"), lambda tone: tone.criterion_db),
-        (Column("verdict", "Verdict"), _tone_verdict),
-        (Column("origin", "Order and owner"), _origin_words),
-        (Column("notes", "Notes"), lambda tone: "; ".join(tone.notes)),
+        (Column("run", say("Run")), lambda tone: tone.run),
+        (Column("channel", say("Microphone")), lambda tone: tone.channel),
+        (Column("method", say("Method")), lambda tone: tone.method),
+        (Column("speed", say("Speed")), lambda tone: _speed(tone.speed)),
+        (Column("frequency_hz", say("Frequency"), "Hz", 1, "number"), lambda tone: tone.frequency_hz),
+        (Column("level_db", say("Level"), "dB re 20 µPa", 1, "number"), lambda tone: tone.level_db),
+        (Column("weighting", say("Weighting")), lambda tone: tone.weighting),
+        (Column("value_db", say("Value"), "dB", 1, "number"), lambda tone: tone.value_db),
+        (Column("criterion_db", say("Criterion"), "dB", 1, "number"), lambda tone: tone.criterion_db),
+        (Column("verdict", say("Verdict")), _tone_verdict),
+        (Column("origin", say("Order and owner")), _origin_words),
+        (Column("notes", say("Notes")), lambda tone: "; ".join(tone.notes)),
     ]
-    return item_table("tones", "Tones by all methods", held, columns, analysis.campaign.origin)
+    return item_table("tones", say("Tones by all methods"), held, columns, analysis.campaign.origin)
 
 
 def _speed(span: SpeedSpan | None) -> str:
@@ -344,5 +386,5 @@ def _speed(span: SpeedSpan | None) -> str:
 
 def _tone_verdict(tone: RunTone) -> str:
     if tone.weighting == "Z":
-        return "not rated" if tone.prominent is None else "prominent" if tone.prominent else "not prominent"
-    return "not known" if tone.audible is None else "audible" if tone.audible else "not audible"
+        return say("not rated") if tone.prominent is None else "prominent" if tone.prominent else say("not prominent")
+    return say("not known") if tone.audible is None else "audible" if tone.audible else say("not audible")

@@ -8,6 +8,7 @@ import numpy as np
 
 from tdacoustic.measured.tonality import RunTone, Tonality
 from tdacoustic.reporting.figure import Axis, Bars, Element, Figure, Line, Markers
+from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.spectra import density_levels, level_axis
 from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, condition_words, slug, tested_runs
 from tdacoustic.results import Analysis
@@ -39,11 +40,14 @@ def audibility_figure(analysis: Analysis, found: Tonality, microphones: Sequence
         return None
     return Figure(
         "audibility",
-        f"Mean audibility by run, {method}",
-        "Above 0 dB a tone is audible over the noise that masks it; \N{MINUS SIGN}10 dB stands for no audible tone. "
-        "The bars' errors are the 90 % interval.",
-        Axis("Run"),
-        Axis("Mean audibility", "dB"),
+        say("Mean audibility by run, {method}", method=method),
+        say(
+            "Above 0 dB a tone is audible over the noise that masks it; \N{MINUS SIGN}10 dB stands for no "
+            "audible tone. "
+            "The bars' errors are the 90 % interval."
+        ),
+        Axis(say("Run")),
+        Axis(say("Mean audibility"), "dB"),
         bars,
         height=340,
     )
@@ -65,8 +69,8 @@ def criterion_figure(analysis: Analysis, found: Tonality, run: str, channel: str
     levels = density_levels(spectrum, spectrum.density)[kept]
     elements: list[Element] = [
         Line(spectrum.frequencies_hz[kept], levels, channel, color=TRACE_SLOT, width=1.0),
-        Line(curve.frequency_hz, curve.prominent_db, "prominent from here", "dashed", CRITERION_SLOT, 1.5),
-        Line(curve.frequency_hz, curve.audible_db, "audible from here", "dotted", CRITERION_SLOT, 1.5),
+        Line(curve.frequency_hz, curve.prominent_db, say("prominent from here"), "dashed", CRITERION_SLOT, 1.5),
+        Line(curve.frequency_hz, curve.audible_db, say("audible from here"), "dotted", CRITERION_SLOT, 1.5),
         *_tone_markers(found, held),
     ]
     name = next(measured for measured in tested_runs(analysis) if measured.name == run)
@@ -76,12 +80,21 @@ def criterion_figure(analysis: Analysis, found: Tonality, run: str, channel: str
     span = max(top - bottom, 1.0)
     return Figure(
         slug("tones", run, channel),
-        f"Tones against their criterion: {condition_words(analysis, name.run.condition or '')}, run {run}, {channel}",
-        f"Line spacing {spectrum.resolution_hz:.3g} Hz. Points are the tones' levels; their colour is their owner. "
-        "Both curves start from the noise in the critical band under the lines: plus the masking index of "
-        "ISO/TS 20065 a tone is audible, plus the criterion of the tone-to-noise ratio (ECMA-418-1) it is prominent. "
-        "The ratings stand under each point; they take the noise as each standard does.",
-        Axis("Frequency", "Hz", "log", limits=(low, high)),
+        say(
+            "Tones against their criterion: {condition}, run {run}, {channel}",
+            condition=condition_words(analysis, name.run.condition or ""),
+            run=run,
+            channel=channel,
+        ),
+        say(
+            "Line spacing {resolution_hz:.3g} Hz. Points are the tones' levels; their colour is "
+            "their owner. Both curves start from the noise in the critical band under the lines: "
+            "plus the masking index of ISO/TS 20065 a tone is audible, plus the criterion of the "
+            "tone-to-noise ratio (ECMA-418-1) it is prominent. The ratings stand under each point; "
+            "they take the noise as each standard does.",
+            resolution_hz=spectrum.resolution_hz,
+        ),
+        Axis(say("Frequency"), "Hz", "log", limits=(low, high)),
         Axis(
             axis.label, axis.unit, axis.scale, (bottom - 0.05 * span, top + HEADROOM * span), axis.reference, axis.note
         ),
@@ -105,7 +118,7 @@ def _tone_markers(found: Tonality, held: Sequence[RunTone]) -> list[Markers]:
                 Markers(
                     np.array([tone.frequency_hz for tone in own]),
                     np.array([tone.level_db for tone in own]),
-                    f"owner {'unknown' if owner == 'unassigned' else owner}",
+                    say("owner {owner}", owner="unknown" if owner == "unassigned" else owner),
                     labels,
                     [_words(found, tone) for tone in own],
                     color=OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
@@ -115,7 +128,7 @@ def _tone_markers(found: Tonality, held: Sequence[RunTone]) -> list[Markers]:
 
 
 def _order(tone: RunTone) -> str:
-    return "" if tone.order is None else f" ({tone.order:.2f} per motor turn)"
+    return "" if tone.order is None else say(" ({order:.2f} per motor turn)", order=tone.order)
 
 
 def _short(tone: RunTone) -> str:
@@ -128,7 +141,14 @@ def _words(found: Tonality, tone: RunTone) -> str:
     for other in found.tones:
         near = abs(other.frequency_hz - tone.frequency_hz) <= 1.5
         if (other.run, other.channel) == (tone.run, tone.channel) and near and other.value_db is not None:
-            words.append(f"{other.method}: {other.value_db:.1f} dB (from {other.criterion_db:.1f} dB)")
+            words.append(
+                say(
+                    "{method}: {value_db:.1f} dB (from {criterion_db:.1f} dB)",
+                    method=other.method,
+                    value_db=other.value_db,
+                    criterion_db=other.criterion_db,
+                )
+            )
     return "\n".join([*words, *tone.notes])
 
 
@@ -150,10 +170,10 @@ def run_up_figures(found: Tonality, run: str, microphones: Sequence[str], method
         figures.append(
             Figure(
                 slug("audibility", run),
-                f"Audibility over time, run {run}, {method}",
-                "Of the most audible tone of each short-time spectrum; \N{MINUS SIGN}10 dB where none is audible.",
-                Axis("Time", "s"),
-                Axis("Audibility", "dB"),
+                say("Audibility over time, run {run}, {method}", run=run, method=method),
+                say("Of the most audible tone of each short-time spectrum; \N{MINUS SIGN}10 dB where none is audible."),
+                Axis(say("Time"), "s"),
+                Axis(say("Audibility"), "dB"),
                 lines,
                 height=300,
             )
@@ -175,10 +195,16 @@ def _tones_over_speed(run: str, shown: Sequence[RunTone], method: str) -> Figure
                 Markers(
                     np.array(middles),
                     np.array([tone.frequency_hz for tone in own]),
-                    f"owner {'unknown' if owner == 'unassigned' else owner}",
+                    say("owner {owner}", owner="unknown" if owner == "unassigned" else owner),
                     texts=[
-                        f"{t.frequency_hz:.1f} Hz{_order(t)}, {_short(t)}, {t.channel}\n"
-                        f"audibility {t.value_db or 0.0:.1f} dB"
+                        say(
+                            "{frequency_hz:.1f} Hz{order}, {short}, {channel}\naudibility {value_db:.1f} dB",
+                            frequency_hz=t.frequency_hz,
+                            order=_order(t),
+                            short=_short(t),
+                            channel=t.channel,
+                            value_db=t.value_db or 0.0,
+                        )
                         for t in own
                     ],
                     color=OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
@@ -186,11 +212,14 @@ def _tones_over_speed(run: str, shown: Sequence[RunTone], method: str) -> Figure
             )
     return Figure(
         slug("tones-over-speed", run),
-        f"Audible tones over the speed, run {run}, {method}",
-        "At the middle of the speed class that each was heard in. Tones at one height stand still; tones that climb "
-        "with the speed follow an order.",
-        Axis("Speed", unit),
-        Axis("Frequency", "Hz", "log"),
+        say("Audible tones over the speed, run {run}, {method}", run=run, method=method),
+        say(
+            "At the middle of the speed class that each was heard in. Tones at one height stand still; tones "
+            "that climb "
+            "with the speed follow an order."
+        ),
+        Axis(say("Speed"), unit),
+        Axis(say("Frequency"), "Hz", "log"),
         markers,
         height=360,
     )

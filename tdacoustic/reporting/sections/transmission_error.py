@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from tdacoustic.drive import GearState
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import (
     by_speed,
     micrometres,
@@ -36,7 +37,7 @@ PERIODS = 4
 MOST_LINES = 8
 """Conditions of one figure."""
 
-METHOD = (
+METHOD = mark(
     "The dynamic transmission error (DTE) is δ, the displacement of the two gears towards each other along the normal "
     "line of action, with the vibration of both on their bearings. While teeth stay in contact its mean is half the "
     "backlash and the compression of the teeth under the load. Its peak to peak is taken from the whole series, not "
@@ -48,7 +49,7 @@ def transmission_error(result: FleetPrediction) -> Section:
     """Return the section on the dynamic transmission error."""
     states = by_speed(result.prediction.conditions)
     moving = [state for state in states if state.steady.method != "at_rest"]
-    blocks: list[Block] = [Paragraph(METHOD)]
+    blocks: list[Block] = [Paragraph(say(METHOD))]
     if moving:
         shown = shown_state(result)
         blocks.append(FigureBlock(_over_time(result, shown if shown in moving else moving[0]), "calculated"))
@@ -56,7 +57,7 @@ def transmission_error(result: FleetPrediction) -> Section:
         blocks.append(FigureBlock(_of_all(moving), "calculated"))
     blocks.append(_table(states))
     blocks += [Paragraph(text) for text in _against_the_paper(result, states)]
-    return Section("transmission-error", "Dynamic transmission error", blocks)
+    return Section("transmission-error", say("Dynamic transmission error"), blocks)
 
 
 def _waveform(state: GearState) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -75,21 +76,30 @@ def _over_time(result: FleetPrediction, state: GearState) -> Figure:
     error = system.transmission_error_at(time)
     side = math.copysign(1.0, state.steady.torque_n_m)
     edge = 1e6 * (error + side * system.half_backlash_m)
-    lines = [Line(ms, delta, "δ(t)"), Line(ms, edge, "edge of the gap, flanks that carry", style="dashed", color=7)]
+    lines = [
+        Line(ms, delta, "δ(t)"),
+        Line(ms, edge, say("edge of the gap, flanks that carry"), style="dashed", color=7),
+    ]
     if (side * (delta - 1e6 * error)).min() < 0.0:
         other = 1e6 * (error - side * system.half_backlash_m)
-        lines.append(Line(ms, other, "edge of the gap, other flanks", style="dotted", color=7))
-    between = "Between the dashed line and the one a backlash away from it the teeth do not touch."
-    together = "δ stays beyond it, so the teeth stay in contact."
-    record = "" if state.steady.repeats_after is not None else " The first mesh periods of the record."
+        lines.append(Line(ms, other, say("edge of the gap, other flanks"), style="dotted", color=7))
+    between = say("Between the dashed line and the one a backlash away from it the teeth do not touch.")
+    together = say("δ stays beyond it, so the teeth stay in contact.")
+    record = "" if state.steady.repeats_after is not None else say(" The first mesh periods of the record.")
     return Figure(
         "dte-over-time",
-        f"Dynamic transmission error over time, {state_words(state)}",
-        f"{sentence(motion_words(state.steady))} Peak to peak {micrometres(state.steady.dte_pp_m)}. "
-        "The dashed line is where the flanks that carry begin to touch: half the backlash and the transmission error "
-        f"of the unloaded gears. {between if state.steady.separates else together}{record}",
-        Axis("Time", "ms"),
-        Axis("DTE δ", "µm"),
+        say("Dynamic transmission error over time, {state}", state=state_words(state)),
+        say(
+            "{sentence} Peak to peak {micrometres}. The dashed line is where the flanks that carry "
+            "begin to touch: half the backlash and the transmission error of the unloaded gears. "
+            "{between}{record}",
+            sentence=sentence(motion_words(state.steady)),
+            micrometres=micrometres(state.steady.dte_pp_m),
+            between=between if state.steady.separates else together,
+            record=record,
+        ),
+        Axis(say("Time"), "ms"),
+        Axis(say("DTE δ"), "µm"),
         lines,
         height=380,
     )
@@ -102,13 +112,17 @@ def _of_all(moving: list[GearState]) -> Figure:
         state = moving[place]
         time, delta = _waveform(state)
         lines.append(Line(time, delta - delta.mean(), state.condition.name))
-    some = "" if len(places) == len(moving) else f" {len(places)} of {len(moving)} conditions are drawn."
+    some = (
+        ""
+        if len(places) == len(moving)
+        else say(" {n_places} of {n_moving} conditions are drawn.", n_places=len(places), n_moving=len(moving))
+    )
     return Figure(
         "dte-conditions",
-        "Dynamic transmission error of the conditions over mesh periods",
-        f"Each without its mean.{some}",
-        Axis("Time", "mesh periods"),
-        Axis("δ without its mean", "µm"),
+        say("Dynamic transmission error of the conditions over mesh periods"),
+        say("Each without its mean.{some}", some=some),
+        Axis(say("Time"), say("mesh periods")),
+        Axis(say("δ without its mean"), "µm"),
         lines,
         height=380,
     )
@@ -116,15 +130,15 @@ def _of_all(moving: list[GearState]) -> Figure:
 
 def _table(states: list[GearState]) -> Table:
     columns = (
-        Column("condition", "Condition"),
-        Column("mesh_frequency_hz", "Mesh", "Hz", 1, "number"),
-        Column("dte_pp_um", "Peak to peak", "µm", 2, "number"),
-        Column("mean_um", "Mean", "µm", 1, "number"),
-        Column("static_compression_um", "F₀ / k̄", "µm", 1, "number"),
-        Column("contact_percent", "Contact", "% of time", 1, "number"),
-        Column("floquet_max", "Floquet", "largest", 3, "number"),
-        Column("motion", "Motion"),
-        Column("method", "Found by"),
+        Column("condition", say("Condition")),
+        Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
+        Column("dte_pp_um", say("Peak to peak"), "µm", 2, "number"),
+        Column("mean_um", say("Mean"), "µm", 1, "number"),
+        Column("static_compression_um", say("F₀ / k̄"), "µm", 1, "number"),
+        Column("contact_percent", say("Contact"), say("% of time"), 1, "number"),
+        Column("floquet_max", say("Floquet"), "largest", 3, "number"),
+        Column("motion", say("Motion")),
+        Column("method", say("Found by")),
     )
     rows: list[list[Cell]] = [
         [
@@ -139,7 +153,7 @@ def _table(states: list[GearState]) -> Table:
         ]
         for state in states
     ]
-    return Table("dte", "Dynamic transmission error of the conditions", columns, rows, origin="calculated")
+    return Table("dte", say("Dynamic transmission error of the conditions"), columns, rows, origin="calculated")
 
 
 def _against_the_paper(result: FleetPrediction, states: list[GearState]) -> list[str]:
@@ -149,9 +163,17 @@ def _against_the_paper(result: FleetPrediction, states: list[GearState]) -> list
         row = printed_of(state)
         if row is not None and row.condition == FIGURE_11_CONDITION and state.steady.dte_pp_m > 0.0:
             return [
-                f"The paper ({PAPER}, section 4.3 and Fig. 11) prints {DTE_PP_UM:g} µm peak to peak for its condition "
-                f"{FIGURE_11_CONDITION}; here it is {1e6 * state.steady.dte_pp_m:.2f} µm. The two cannot check each "
-                "other: the paper prints no transmission error, torque, inertia, bearing or damping. The figure here "
-                f"depends on what is assumed: {assumed_words(result.fleet)}."
+                say(
+                    "The paper ({paper}, section 4.3 and Fig. 11) prints {dte_pp_um:g} µm peak to "
+                    "peak for its condition {figure_11_condition}; here it is {dte_pp_m:.2f} µm. The "
+                    "two cannot check each other: the paper prints no transmission error, torque, "
+                    "inertia, bearing or damping. The figure here depends on what is assumed: "
+                    "{assumed}.",
+                    paper=say(PAPER),
+                    dte_pp_um=DTE_PP_UM,
+                    figure_11_condition=FIGURE_11_CONDITION,
+                    dte_pp_m=1000000.0 * state.steady.dte_pp_m,
+                    assumed=assumed_words(result.fleet),
+                )
             ]
     return []

@@ -23,6 +23,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Element, Figure, Markers
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.parameters import keyed_words
 from tdacoustic.reporting.sections.words import joined, pretty_signs
@@ -31,7 +32,7 @@ from tdacoustic.studies.words import unit_of
 
 __all__ = ["what_if_line", "what_if_of", "what_if_section"]
 
-SOURCES: Final = {"motor": "the motor", "mesh": "the meshing noise", "structure": "the structure"}
+SOURCES: Final = {"motor": mark("the motor"), "mesh": mark("the meshing noise"), "structure": mark("the structure")}
 SLOTS: Final = {"motor": 0, "mesh": 1, "structure": 2}
 
 MOST_NAMED: Final = 4
@@ -44,7 +45,7 @@ LITTLE_DB: Final = 1.0
 SMALLEST_DB: Final = 0.05
 """Changes that are none at the decimals shown."""
 
-ALONE: Final = "is all that sounds in the model, each decibel less of it is one less at"
+ALONE: Final = mark("is all that sounds in the model, each decibel less of it is one less at")
 
 _GROUP: Final = 0.68
 """Part of a category that its bars take together, in both renderers."""
@@ -76,10 +77,12 @@ def what_if_section(answer: WhatIfAnswer, fleet: Fleet) -> Section | None:
     figure = _figure(answer, conditions)
     blocks += [] if figure is None else [FigureBlock(figure, "calculated")]
     near = [level for levels in conditions for level in levels]
-    blocks.append(_table(answer, "what-if-surface", f"Changes at {answer.surface}, unweighted", near))
-    whole = _table(answer, "what-if", "All receivers, unweighted and A-weighted", answer.levels)
-    blocks.append(Details("All receivers, unweighted and A-weighted", [whole]))
-    return Section("what-if", "What it brings to quieten a source", blocks)
+    blocks.append(
+        _table(answer, "what-if-surface", say("Changes at {surface}, unweighted", surface=answer.surface), near)
+    )
+    whole = _table(answer, "what-if", say("All receivers, unweighted and A-weighted"), answer.levels)
+    blocks.append(Details(say("All receivers, unweighted and A-weighted"), [whole]))
+    return Section("what-if", say("What it brings to quieten a source"), blocks)
 
 
 def what_if_line(answer: WhatIfAnswer | None) -> str:
@@ -94,26 +97,38 @@ def what_if_line(answer: WhatIfAnswer | None) -> str:
         said = (
             "; ".join(_effects(answer, levels, with_off=False))
             if alone is None
-            else f"{SOURCES[alone]} {ALONE} {answer.surface}"
+            else f"{say(SOURCES[alone])} {say(ALONE)} {answer.surface}"
         )
-        parts.append(f"at {levels[0].train_speed_km_h:.4g} km/h {said}")
+        parts.append(
+            say("at {train_speed_km_h:.4g} km/h {said}", train_speed_km_h=levels[0].train_speed_km_h, said=said)
+        )
     said = ". ".join([parts[0], *(sentence(part).rstrip(".") for part in parts[1:])])
-    return f"What if (the model's level at {answer.surface}): {said}. {_lines_words(answer)}"
+    return say(
+        "What if (the model's level at {surface}): {said}. {lines}",
+        surface=answer.surface,
+        said=said,
+        lines=_lines_words(answer),
+    )
 
 
 def _lines_words(answer: WhatIfAnswer) -> str:
     """What of the sound the model has, and so what of a recorded level can change."""
     fractions = [fraction for _, fraction in answer.line_fractions]
     if not fractions:
-        return "The model has lines alone: a recorded level, with broadband sound in it, changes by less."
+        return say("The model has lines alone: a recorded level, with broadband sound in it, changes by less.")
     ends = (min(fractions), max(fractions))
     parts = " to ".join(dict.fromkeys(f"{100.0 * end:.0f}" for end in ends))
     most = " to ".join(dict.fromkeys(f"{most_off_db(end):.1f}" for end in ends if end < 1.0))
-    text = f"The model has lines alone, which are {parts} % of the recorded sound energy"
+    text = say("The model has lines alone, which are {parts} % of the recorded sound energy", parts=parts)
     if not most:
         return f"{text}."
-    of_all = "" if len(fractions) == 1 else ", depending on the condition"
-    return f"{text}: as long as the rest stays, the recorded level falls by {most} dB at most{of_all}."
+    of_all = "" if len(fractions) == 1 else say(", depending on the condition")
+    return say(
+        "{text}: as long as the rest stays, the recorded level falls by {most} dB at most{of_all}.",
+        text=text,
+        most=most,
+        of_all=of_all,
+    )
 
 
 def _conditions(answer: WhatIfAnswer) -> list[list[WhatIfLevel]]:
@@ -128,11 +143,12 @@ def _conditions(answer: WhatIfAnswer) -> list[list[WhatIfLevel]]:
 def _cases_words(answer: WhatIfAnswer, fleet: Fleet) -> str:
     if not answer.assumed:
         cases = joined([f"{_quoted(case.name)} ({_case_words(case, fleet)})" for case in answer.cases])
-        return f"The cases are those of the fleet's [[what_if]]: {cases}."
+        return say("The cases are those of the fleet's [[what_if]]: {cases}.", cases=cases)
     steps = joined([f"{abs(step):g}" for step in STEPS_DB])
-    return (
-        f"The fleet asks for no case of its own ([[what_if]]): each source of the total is taken {steps} dB down "
-        "[assumed steps] and left out."
+    return say(
+        "The fleet asks for no case of its own ([[what_if]]): each source of the total is taken "
+        "{steps} dB down [assumed steps] and left out.",
+        steps=steps,
     )
 
 
@@ -143,9 +159,12 @@ def _quoted(name: str) -> str:
 def _case_words(case: WhatIf, fleet: Fleet) -> str:
     """What a case changes."""
     changes = {path: case.gain_db(path) for path in case.stated_paths}
-    parts = [f"{path} off" if change == -math.inf else f"{path} {change:+g} dB" for path, change in changes.items()]
+    parts = [
+        say("{path} off", path=path) if change == -math.inf else f"{path} {change:+g} dB"
+        for path, change in changes.items()
+    ]
     parts += [f"{keyed_words(key, fleet)} = {_value_words(key, value)}" for key, value in case.parameters]
-    only = "" if case.conditions is None else f", in {_names(case.conditions)} only"
+    only = "" if case.conditions is None else say(", in {names} only", names=_names(case.conditions))
     return pretty_signs(", ".join(parts)) + only
 
 
@@ -164,15 +183,19 @@ def _plain(value: Any) -> str:
 
 
 def _where(levels: Sequence[WhatIfLevel]) -> str:
-    return f"condition {levels[0].condition} ({levels[0].train_speed_km_h:.4g} km/h)"
+    return say(
+        "condition {condition} ({train_speed_km_h:.4g} km/h)",
+        condition=levels[0].condition,
+        train_speed_km_h=levels[0].train_speed_km_h,
+    )
 
 
 def _condition_words(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel]) -> str:
     before = levels[0].before_db
-    start = f"{_where(levels)}, {before:.1f} dB at {answer.surface}"
+    start = say("{where}, {before:.1f} dB at {surface}", where=_where(levels), before=before, surface=answer.surface)
     alone = _alone(answer, levels)
     if alone is not None:
-        return sentence(f"{start}: {SOURCES[alone]} {ALONE} {answer.surface}")
+        return sentence(f"{start}: {say(SOURCES[alone])} {say(ALONE)} {answer.surface}")
     return sentence(f"{start}: {'; '.join(_effects(answer, levels))}")
 
 
@@ -190,14 +213,19 @@ def _effects(answer: WhatIfAnswer, levels: Sequence[WhatIfLevel], with_off: bool
     held = {level.case: level for level in levels}
     if not answer.assumed:
         said = [f"{_quoted(name)} {_effect(held[name])}" for name in list(held)[:MOST_NAMED]]
-        return [*said, "more in the table"] if len(held) > MOST_NAMED else said
+        return [*said, say("more in the table")] if len(held) > MOST_NAMED else said
     found = []
     for path in answer.paths:
         step = held[step_name(path, STEPS_DB[0])]
         off = held[off_name(path)]
-        text = f"{abs(STEPS_DB[0]):g} dB less from {SOURCES[path]} {_effect(step)}"
+        text = say(
+            "{steps_db:g} dB less from {sources} {effect}",
+            steps_db=abs(STEPS_DB[0]),
+            sources=say(SOURCES[path]),
+            effect=_effect(step),
+        )
         if with_off and off.change_db is not None and (step.change_db or 0.0) - off.change_db >= SMALLEST_DB:
-            text += f", {_taken(off)} if it were silent"
+            text += say(", {taken} if it were silent", taken=_taken(off))
         found.append(text)
     return found
 
@@ -206,14 +234,20 @@ def _effect(level: WhatIfLevel) -> str:
     """A change in words, with its interval."""
     change, ends = level.change_db, level.change_95_db
     if change is None:
-        return "leaves nothing that sounds"
+        return say("leaves nothing that sounds")
     low, high = (change, change) if ends is None else ends
     if low <= -SMALLEST_DB and high >= SMALLEST_DB:
         about = f"{change:+.1f}" if abs(change) >= SMALLEST_DB else "0.0"
-        return pretty_signs(f"changes it by {about} dB ({low:+.1f} to {high:+.1f})")
+        return pretty_signs(
+            say("changes it by {about} dB ({low:+.1f} to {high:+.1f})", about=about, low=low, high=high)
+        )
     if max(-low, high) < SMALLEST_DB:
-        return "changes nothing"
-    return f"adds {_taken(level, -1.0)}" if high >= SMALLEST_DB else f"takes {_taken(level)} off"
+        return say("changes nothing")
+    return (
+        say("adds {taken}", taken=_taken(level, -1.0))
+        if high >= SMALLEST_DB
+        else say("takes {taken} off", taken=_taken(level))
+    )
 
 
 def _taken(level: WhatIfLevel, sign: float = 1.0) -> str:
@@ -241,10 +275,14 @@ def _first_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel
         named.setdefault(ranked[0], []).append(levels[0].condition)
         if _overlap(steps[ranked[0]], steps[ranked[1]]):
             unsure.append(levels[0].condition)
-    parts = [f"at {SOURCES[path]} in {_names(names)}" for path, names in named.items()]
-    text = f"{abs(STEPS_DB[0]):g} dB less bring most {joined(parts)}"
+    parts = [
+        say("at {sources} in {names}", sources=say(SOURCES[path]), names=_names(names)) for path, names in named.items()
+    ]
+    text = say("{steps_db:g} dB less bring most {parts}", steps_db=abs(STEPS_DB[0]), parts=joined(parts))
     if unsure and answer.basis is not None:
-        text += f"; in {_names(unsure)} the intervals overlap, and which source to begin with is not decided"
+        text += say(
+            "; in {names} the intervals overlap, and which source to begin with is not decided", names=_names(unsure)
+        )
     return sentence(text)
 
 
@@ -273,20 +311,31 @@ def _little_words(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLeve
             else:
                 perhaps.setdefault(path, []).append(levels[0].condition)
                 most_db = max(most_db, at_most_db)
-    start = f"Left out altogether, less than {LITTLE_DB:g} dB is gained from"
-    found = [f"{start} {_where_from(little)}: others come first."] if little else []
+    start = say("Left out altogether, less than {little_db:g} dB is gained from", little_db=LITTLE_DB)
+    found = (
+        [say("{start} {where_from}: others come first.", start=start, where_from=_where_from(little))] if little else []
+    )
     if perhaps:
-        most = f"up to {most_db:.1f} dB by the intervals"
-        found.append(f"{start} {_where_from(perhaps)} by the fitted values, but {most}.")
+        most = say("up to {most_db:.1f} dB by the intervals", most_db=most_db)
+        found.append(
+            say(
+                "{start} {where_from} by the fitted values, but {most}.",
+                start=start,
+                where_from=_where_from(perhaps),
+                most=most,
+            )
+        )
     return found
 
 
 def _where_from(named: Mapping[str, Sequence[str]]) -> str:
-    return joined([f"{SOURCES[path]} in {_names(names)}" for path, names in named.items()])
+    return joined(
+        [say("{sources} in {names}", sources=say(SOURCES[path]), names=_names(names)) for path, names in named.items()]
+    )
 
 
 def _names(names: Sequence[str]) -> str:
-    return f"condition{'s' if len(names) > 1 else ''} {joined(names)}"
+    return say("condition{value} {names}", value="s" if len(names) > 1 else "", names=joined(names))
 
 
 # ---------------------------------------------------------------- how sure
@@ -295,30 +344,37 @@ def _names(names: Sequence[str]) -> str:
 def _interval_words(answer: WhatIfAnswer, fleet: Fleet) -> str:
     basis = answer.basis
     if basis is None:
-        return (
+        return say(
             "There is no interval: without a calibration the levels of the sources stand as the fleet's values make "
             "them, and nothing says how far these are off."
         )
-    method = "the range over" if basis.method == "profile" else "2.5 and 97.5 % quantiles over"
-    how = "that the data allow (profile likelihood)" if basis.method == "profile" else "out of the posterior"
+    method = say("the range over") if basis.method == "profile" else say("2.5 and 97.5 % quantiles over")
+    how = say("that the data allow (profile likelihood)") if basis.method == "profile" else say("out of the posterior")
     keys = joined([keyed_words(key, fleet) for key in basis.parameters])
-    fitted = f"all values of {keys} {how}" if keys else "no parameter, as none was fitted"
+    fitted = say("all values of {keys} {how}", keys=keys, how=how) if keys else say("no parameter, as none was fitted")
     scatter = (
-        f", together with the model's scatter of {basis.model_sigma_db:.2g} dB as an error of each source by itself in "
-        "each condition [assumed]"
+        say(
+            ", together with the model's scatter of {model_sigma_db:.2g} dB as an error of each "
+            "source by itself in each condition [assumed]",
+            model_sigma_db=basis.model_sigma_db,
+        )
         if basis.model_sigma_db > 0.0
         else ""
     )
     alone = (
-        " If the sources are off alike, the interval of the fitted parameters alone holds; the table has it too."
+        say(" If the sources are off alike, the interval of the fitted parameters alone holds; the table has it too.")
         if basis.model_sigma_db > 0.0
         else ""
     )
-    return (
-        f"In brackets: intervals of 95 %, {method} {fitted}{scatter}.{alone} Not in them is what parameters that were "
-        "not fitted are off by beyond that, sound that the model does not have, and whether a measure keeps what it "
-        "promises. The levels in the table are the model's; of a measured level a change holds as far as these lines "
-        "make it."
+    return say(
+        "In brackets: intervals of 95 %, {method} {fitted}{scatter}.{alone} Not in them is what "
+        "parameters that were not fitted are off by beyond that, sound that the model does not "
+        "have, and whether a measure keeps what it promises. The levels in the table are the "
+        "model's; of a measured level a change holds as far as these lines make it.",
+        method=method,
+        fitted=fitted,
+        scatter=scatter,
+        alone=alone,
     )
 
 
@@ -326,9 +382,15 @@ def _open_words(answer: WhatIfAnswer, fleet: Fleet) -> list[str]:
     held = () if answer.basis is None else answer.basis.open_parameters
     if not held:
         return []
-    bounds = "their bounds hold" if len(held) > 1 else "its bounds hold"
+    bounds = say("their bounds hold") if len(held) > 1 else say("its bounds hold")
     named = joined([keyed_words(key, fleet) for key in held])
-    return [f"The data do not determine {named}: {bounds} these intervals, as far as they depend on it."]
+    return [
+        say(
+            "The data do not determine {named}: {bounds} these intervals, as far as they depend on it.",
+            named=named,
+            bounds=bounds,
+        )
+    ]
 
 
 # ---------------------------------------------------------------- figure and tables
@@ -353,17 +415,17 @@ def _figure(answer: WhatIfAnswer, conditions: Sequence[Sequence[WhatIfLevel]]) -
             marked.append(np.stack([x, _off_db([_of_case(levels, off) for levels in conditions])]))
     if marked:
         x, most = np.concatenate(marked, axis=1)
-        elements.append(Markers(x, most, "the source left out", symbol="x", color=7))
+        elements.append(Markers(x, most, say("the source left out"), symbol="x", color=7))
     if all(not np.isfinite(element.values).any() for element in elements if isinstance(element, Bars)):
         return None
-    lines = [] if answer.basis is None else ["Lines are intervals of 95 %."]
-    marks = ["A cross is missing where nothing is left that sounds."] if answer.assumed else []
+    lines = [] if answer.basis is None else [say("Lines are intervals of 95 %.")]
+    marks = [say("A cross is missing where nothing is left that sounds.")] if answer.assumed else []
     return Figure(
         "what-if-over-speed",
-        f"What changes take off the level at {answer.surface}",
-        " ".join(["One group a condition, by speed.", *lines, *marks]),
-        Axis("Condition"),
-        Axis("Less at " + answer.surface, "dB"),
+        say("What changes take off the level at {surface}", surface=answer.surface),
+        " ".join([say("One group a condition, by speed."), *lines, *marks]),
+        Axis(say("Condition")),
+        Axis(say("Less at ") + answer.surface, "dB"),
         elements,
     )
 
@@ -391,21 +453,21 @@ def _table(answer: WhatIfAnswer, name: str, caption: str, levels: Iterable[WhatI
     with_ends = answer.basis is not None
     everywhere = name == "what-if"
     columns = [
-        Column("condition", "Condition"),
-        Column("train_speed_km_h", "Speed", "km/h", 1, "number"),
-        *((Column("receiver", "At"), Column("weighting", "Weighting")) if everywhere else ()),
-        Column("case", "Case"),
-        Column("before_db", "As it is", "dB", 1, "number"),
-        Column("level_db", "Then", "dB", 1, "number"),
-        Column("change_db", "Change", "dB", 1, "number"),
+        Column("condition", say("Condition")),
+        Column("train_speed_km_h", say("Speed"), "km/h", 1, "number"),
+        *((Column("receiver", say("At")), Column("weighting", say("Weighting"))) if everywhere else ()),
+        Column("case", say("Case")),
+        Column("before_db", say("As it is"), "dB", 1, "number"),
+        Column("level_db", say("Then"), "dB", 1, "number"),
+        Column("change_db", say("Change"), "dB", 1, "number"),
     ]
     if with_ends:
         columns += [
-            Column("change_low_db", "95 % from", "dB", 1, "number"),
+            Column("change_low_db", say("95 % from"), "dB", 1, "number"),
             Column("change_high_db", "to", "dB", 1, "number"),
-            Column("fit_change_low_db", "Fit alone from", "dB", 1, "number"),
+            Column("fit_change_low_db", say("Fit alone from"), "dB", 1, "number"),
             Column("fit_change_high_db", "to", "dB", 1, "number"),
-            Column("level_low_db", "Level 95 % from", "dB", 1, "number"),
+            Column("level_low_db", say("Level 95 % from"), "dB", 1, "number"),
             Column("level_high_db", "to", "dB", 1, "number"),
         ]
     rows: list[list[Cell]] = []
@@ -417,4 +479,6 @@ def _table(answer: WhatIfAnswer, name: str, caption: str, levels: Iterable[WhatI
         for pair in ends:
             row += [None, None] if pair is None else list(pair)
         rows.append(row)
-    return Table(name, caption, columns, rows, csv=f"{name}.csv" if everywhere else None, origin="calculated")
+    return Table(
+        name, caption, columns, rows, csv=say("{name}.csv", name=name) if everywhere else None, origin="calculated"
+    )

@@ -10,6 +10,7 @@ from tdacoustic.attribution import SourceLine
 from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.results import Analysis
 
 __all__ = [
@@ -35,7 +36,7 @@ OWNER_SLOTS = {"motor": 0, "gearbox": 1, "ambiguous": 3, "unassigned": 7}
 """Colour of a source, the same in every figure."""
 OWNER_SLOT_OTHER = 2
 
-UNKNOWN_SPEED = "speed not known"
+UNKNOWN_SPEED = mark("speed not known")
 
 SAME_LINE = 0.003
 """Relative distance within which two receivers' lines are named once in a sentence."""
@@ -76,7 +77,7 @@ def speed_words(run: MeasuredRun) -> str:
     if run.train_speed_km_h is not None:
         words.append(f"{run.train_speed_km_h:.4g} km/h")
     if run.motor_speed_hz is not None:
-        words.append(f"motor {60.0 * run.motor_speed_hz:.4g} rpm")
+        words.append(say("motor {motor_speed_hz:.4g} rpm", motor_speed_hz=60.0 * run.motor_speed_hz))
     profile = None if run.measurement is None else run.measurement.speed.leading
     if profile is not None and run.measurement is not None:
         if run.measurement.steady and not words:  # nobody says of which shaft it is
@@ -85,16 +86,28 @@ def speed_words(run: MeasuredRun) -> str:
         elif not run.measurement.steady:
             factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
             of_shaft = f"{profile.shaft} " if profile.shaft else ""
-            words.append(f"{of_shaft}{factor * profile.speed.min():.4g} to {factor * profile.speed.max():.4g} {unit}")
+            words.append(
+                say(
+                    "{of_shaft}{speed:.4g} to {speed_2:.4g} {unit}",
+                    of_shaft=of_shaft,
+                    speed=factor * profile.speed.min(),
+                    speed_2=factor * profile.speed.max(),
+                    unit=unit,
+                )
+            )
         if profile.source == "lines":
-            words.append("read from lines")
-    return pretty_signs(", ".join(words)) or UNKNOWN_SPEED
+            words.append(say("read from lines"))
+    return pretty_signs(", ".join(words)) or say(UNKNOWN_SPEED)
 
 
 def condition_words(analysis: Analysis, condition: str) -> str:
     """Name of a condition with its speed."""
     runs = [run for run in tested_runs(analysis) if run.run.condition == condition]
-    return f"Condition {condition} ({speed_words(runs[0])})" if runs else f"Condition {condition}"
+    return (
+        say("Condition {condition} ({speed})", condition=condition, speed=speed_words(runs[0]))
+        if runs
+        else say("Condition {condition}", condition=condition)
+    )
 
 
 def tested_runs(analysis: Analysis) -> list[MeasuredRun]:
