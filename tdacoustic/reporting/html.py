@@ -43,12 +43,12 @@ from tdacoustic.reporting.document import (
     walk,
 )
 from tdacoustic.reporting.figure import Heatmap
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, spoken
 from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
 from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
-from tdacoustic.reporting.shown import NOTICE_WORDS, ORIGIN_SENTENCES, cell_text
+from tdacoustic.reporting.shown import NOTICE_WORDS, ORIGIN_SENTENCES, ORIGIN_WORDS, cell_text
 from tdacoustic.reporting.sound_view import sound_view
 from tdacoustic.tables.writing import csv_cell
 
@@ -94,27 +94,26 @@ def _plotly_script() -> tuple[str, str]:
 
 
 def _script_hash(source: bytes) -> str:
-    return say("'sha256-{decode}'", decode=base64.b64encode(hashlib.sha256(source).digest()).decode("ascii"))
+    return f"'sha256-{base64.b64encode(hashlib.sha256(source).digest()).decode('ascii')}'"
 
 
 def _policy(script_hashes: Sequence[str]) -> str:
-    return say(
-        "default-src 'none'; script-src {script_hashes}; style-src 'unsafe-inline'; img-src "
-        "data: blob:; media-src data:; base-uri 'none'; form-action 'none'",
-        script_hashes=" ".join(script_hashes),
+    return (
+        f"default-src 'none'; script-src {' '.join(script_hashes)}; style-src 'unsafe-inline'; "
+        "img-src data: blob:; media-src data:; base-uri 'none'; form-action 'none'"
     )
 
 
 def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     """What a cell shows, and what it sorts and downloads as (``raw``; None: the same)."""
     align = column.align or ("right" if column.kind == "number" else "left")
-    tag = say('th scope="row"') if first and column.kind == "text" else "td"
+    tag = 'th scope="row"' if first and column.kind == "text" else "td"
     view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None, "href": None}
     view["text"] = text = cell_text(column, cell)
     if cell is None:
         return view | {"raw": ""}
     if isinstance(cell, Link):
-        return view | {"href": cell.href, "raw": _raw(cell.text)}
+        return view | {"href": cell.href, "raw": _raw(cell.text, text)}
     if isinstance(cell, bool):
         return view | {"raw": "true" if cell else "false"}
     if not isinstance(cell, str):
@@ -126,13 +125,13 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     if column.kind in ("origin", "verdict") and cell:
         known = column.kind == "origin" or cell in ("ok", "warning", "bad")
         view["chip"] = f"{column.kind}-{cell}" if known else "verdict-other"
-    return view | {"raw": _raw(cell)}
+    return view | {"raw": _raw(cell, text)}
 
 
-def _raw(text: str) -> str | None:
+def _raw(text: str, shown: str) -> str | None:
     """What a text downloads as; None: as it is shown."""
     raw = csv_cell(text)
-    return None if raw == text.strip() else raw
+    return None if raw == shown.strip() else raw
 
 
 def _table(table: Table) -> dict[str, Any]:
@@ -205,10 +204,10 @@ class _Views:
             "title": figure.title.rstrip("."),
             "caption": figure.caption,
             "alt": say(
-                "{title}: {caption} over {caption_2}",
+                "{title}: {y_axis} over {x_axis}",
                 title=figure.title,
-                caption=figure.y_axis.caption,
-                caption_2=figure.x_axis.caption,
+                y_axis=figure.y_axis.caption,
+                x_axis=figure.x_axis.caption,
             ),
             "origin": block.origin,
             "png": Markup(packed),
@@ -285,15 +284,7 @@ class _Views:
 def _house(house: House | None) -> dict[str, Any] | None:
     if house is None or not (house.company or house.lines or house.logo):
         return None
-    logo = (
-        say(
-            "data:{logo_type};base64,{decode}",
-            logo_type=house.logo_type,
-            decode=base64.b64encode(house.logo).decode("ascii"),
-        )
-        if house.logo
-        else ""
-    )
+    logo = f"data:{house.logo_type};base64,{base64.b64encode(house.logo).decode('ascii')}" if house.logo else ""
     return {"company": house.company, "lines": house.lines, "logo": Markup(logo)}
 
 
@@ -340,14 +331,14 @@ def render_html(
     if views.full:
         still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
         text = say(
-            "Of the {still} figures of this page the first {interactive} can be zoomed; ",
+            "Of the {still} figures of this page the first {interactive} can be zoomed; the others are still pictures, "
+            "which keeps the page small.",
             still=still,
             interactive=views.interactive,
         )
-        text += say("the others are still pictures, which keeps the page small.")
         if views.left_out:
-            text += say(
-                " The last {left_out} are left out; what they show is in result.h5 and the tables.",
+            text += " " + say(
+                "The last {left_out} are left out; what they show is in result.h5 and the tables.",
                 left_out=views.left_out,
             )
         document_notices = (*document.notices, Notice("info", text))
@@ -356,10 +347,7 @@ def render_html(
     packed, plotly_hash = _plotly_script() if views.interactive else ("", "")
     script = _template("page.js")
     hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]
-    dark = say(
-        "@media screen and (prefers-color-scheme: dark) {{ :root {{ {css_variables} }} }}\n",
-        css_variables=css_variables("dark"),
-    )
+    dark = f"@media screen and (prefers-color-scheme: dark) {{ :root {{ {css_variables('dark')} }} }}\n"
     environment = Environment(autoescape=True, undefined=StrictUndefined)
     page = environment.from_string(_template("page.html.j2"))
     return page.render(
@@ -375,15 +363,11 @@ def render_html(
         origin_words=say(ORIGIN_SENTENCES[document.origin]),
         sections=sections,
         words=NOTICE_WORDS,
+        origins=ORIGIN_WORDS,
+        say=say,
+        language=spoken().code,
         policy=Markup(_policy(hashes)),
-        css=Markup(
-            say(
-                ":root {{ {css_variables} }}\n{dark}{template}",
-                css_variables=css_variables("light"),
-                dark=dark,
-                template=_template("page.css"),
-            )
-        ),
+        css=Markup(f":root {{ {css_variables('light')} }}\n{dark}{_template('page.css')}"),
         js=Markup(script),
         palette=Markup(safe_json({"light": dict(LIGHT), "dark": dict(DARK)})),
         plotly=Markup(packed),

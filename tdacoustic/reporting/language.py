@@ -10,7 +10,7 @@ from __future__ import annotations
 import gettext
 import io
 import string
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -163,18 +163,18 @@ def read_language(path: Path) -> Language:
         forms = tuple(message.string) if isinstance(message.string, (tuple, list)) else ()
         if len(forms) == catalogue.num_plurals and all(forms):
             for text in forms:
-                _check_fields(path, message, many, text)
+                _check_fields(path, message, many, text, {"count"})
             counted[one, many] = forms
     return Language(code.replace("_", "-"), texts, counted, form)
 
 
-def _check_fields(path: Path, message: Message, english: str, text: str) -> None:
+def _check_fields(path: Path, message: Message, english: str, text: str, optional: Set[str] = frozenset()) -> None:
     """Raise where a translation fills in what its English text does not have, or otherwise formatted."""
     known = _fields(english)
     if not known:  # it is not filled in, so braces are braces
         return
     try:
-        wrong = sorted(_fields(text) ^ known - {"count"})
+        wrong = sorted((_fields(text) ^ known) - optional)
     except ValueError:
         wrong = ["unpaired braces"]
     if wrong:

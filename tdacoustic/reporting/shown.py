@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from tdacoustic.reporting.document import Cell, Column, Link
-from tdacoustic.reporting.language import mark
+from tdacoustic.reporting.language import mark, say
 
-__all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "cell_text", "number_text"]
+__all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "ORIGIN_WORDS", "cell_text", "number_text"]
 
 NOTICE_WORDS: Final = {
     "info": mark("Note"),
@@ -17,6 +17,15 @@ NOTICE_WORDS: Final = {
     "assumed": mark("Assumed"),
 }
 """What a notice of each kind begins with."""
+ORIGIN_WORDS: Final = {
+    "measured": mark("measured"),
+    "synthetic": mark("synthetic"),
+    "printed": mark("printed"),
+    "assumed": mark("assumed"),
+    "calculated": mark("calculated"),
+    "mixed": mark("mixed"),
+}
+"""Where a number comes from, as tags say it."""
 ORIGIN_SENTENCES: Final = {
     "measured": mark("The data of this report were measured."),
     "synthetic": mark("The data of this report were made by a program. They are not measurements."),
@@ -26,6 +35,15 @@ ORIGIN_SENTENCES: Final = {
     "mixed": mark("The data of this report are of several origins. Each number says its own."),
 }
 """What a report of each origin says of itself."""
+_CHIP_WORDS: Final = ORIGIN_WORDS | {
+    "ok": mark("ok"),
+    "warning": mark("warning"),
+    "bad": mark("bad"),
+    "motor": mark("motor"),
+    "gearbox": mark("gearbox"),
+    "undecided": mark("undecided"),
+}
+"""Words of the tables that stand in a tag; files have them in English."""
 
 
 def number_text(value: float, digits: int | None) -> str:
@@ -61,5 +79,7 @@ def cell_text(column: Column, cell: Cell) -> str:
     if isinstance(cell, Link):
         return cell.text
     if isinstance(cell, bool):
-        return "yes" if cell else "no"
-    return cell if isinstance(cell, str) else number_text(cell, column.digits)
+        return say("yes") if cell else say("no")
+    if isinstance(cell, str):
+        return say(_CHIP_WORDS.get(cell, cell)) if column.kind in ("origin", "verdict") else cell
+    return number_text(cell, column.digits)

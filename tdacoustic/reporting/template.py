@@ -1,4 +1,4 @@
-"""A company's template: its name, logo and lines on the report, its title, and the order of the sections.
+"""A company's template: its name, logo and lines on the report, its title and language, and the order of the sections.
 
 It changes how a report is laid out, never a number in it; what it leaves out is said at the end of the report.
 """
@@ -16,6 +16,7 @@ from pydantic import AfterValidator, Field, ValidationError
 
 from tdacoustic.errors import TdacousticError, TemplateError
 from tdacoustic.reporting.document import Block, Document, House, Section, walk
+from tdacoustic.reporting.language import ENGLISH, Language, read_language, say
 from tdacoustic.toml_models import (
     TOP_LEVEL,
     PathText,
@@ -92,6 +93,7 @@ class TemplateFile(Table):
     logo: PathText | None = None
     lines: Annotated[tuple[Text, ...], Field(max_length=6)] = ()
     footer: Annotated[tuple[Text, ...], Field(max_length=6)] = ()
+    language: PathText | None = None
     sections: TemplateSections = TemplateSections()
 
 
@@ -118,8 +120,10 @@ class ReportTemplate:
     footer : tuple of str
     first, leave_out : tuple of str
         Ids of sections.
+    language : Language
+        In which the report is written.
     sha256 : str
-        Of the file and its logo: another template is another report.
+        Of the file, its logo and its language: another template is another report.
     """
 
     house: House
@@ -127,6 +131,7 @@ class ReportTemplate:
     footer: tuple[str, ...] = ()
     first: tuple[str, ...] = ()
     leave_out: tuple[str, ...] = ()
+    language: Language = ENGLISH
     sha256: str = ""
 
     def applied(self, document: Document) -> Document:
@@ -139,7 +144,11 @@ class ReportTemplate:
         left_out: list[str] = []
         sections = [block for block in self._arranged(document.sections, left_out) if isinstance(block, Section)]
         there = {"summary", *(block.id for block in walk(sections) if isinstance(block, Section))}
-        said = [f"Left out by the template of this report: {', '.join(left_out)}."] if left_out else []
+        said = (
+            [say("Left out by the template of this report: {left_out}.", left_out=", ".join(left_out))]
+            if left_out
+            else []
+        )
         return replace(
             document,
             title=self.title.replace(TITLE, document.title),
@@ -168,7 +177,7 @@ class ReportTemplate:
 
 
 def files_of_template(path: Path) -> Iterator[Path]:
-    """Yield what a template is read from: its folder where that is named, its file, its logo."""
+    """Yield what a template is read from: its folder where that is named, its file, its logo, its language."""
     yield path
     if path.is_dir():
         path /= TEMPLATE
@@ -177,9 +186,10 @@ def files_of_template(path: Path) -> Iterator[Path]:
         raw = read_toml(path, TemplateError)
     except TdacousticError:
         return  # missing or wrong: the file itself tells whether it is still
-    logo = raw.get("logo")
-    if isinstance(logo, str) and path_problem(logo) is None:
-        yield path.parent / logo
+    for key in ("logo", "language"):
+        name = raw.get(key)
+        if isinstance(name, str) and path_problem(name) is None:
+            yield path.parent / name
 
 
 def load_template(path: str | Path) -> ReportTemplate:
@@ -193,9 +203,9 @@ def load_template(path: str | Path) -> ReportTemplate:
     Raises
     ------
     MissingFileError
-        The file or its logo does not exist.
+        The file, its logo or its language does not exist.
     TemplateError
-        It is no valid template, or the logo no PNG or JPEG of at most 500 kB.
+        It is no valid template, the logo no PNG or JPEG of at most 500 kB, or the language no file of translations.
     """
     path = file_or_inside(Path(path), TEMPLATE)
     raw = frozen(read_toml(path, TemplateError))
@@ -209,9 +219,13 @@ def load_template(path: str | Path) -> ReportTemplate:
     if said.logo is not None:
         logo, kind = _logo(path, said.logo)
         digest.update(logo)
+    language = ENGLISH
+    if said.language is not None:
+        language = read_language(path.parent / said.language)
+        digest.update((path.parent / said.language).read_bytes())
     house = House(said.company or "", said.lines, logo, kind)
     return ReportTemplate(
-        house, said.title, said.footer, said.sections.first, said.sections.leave_out, digest.hexdigest()
+        house, said.title, said.footer, said.sections.first, said.sections.leave_out, language, digest.hexdigest()
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -165,7 +166,7 @@ def _write(gathering: Gathering, output: OutputFolder, named: Sequence[Path], pd
     from tdacoustic.tables import csv_text
 
     output.write_text(OVERVIEW, csv_text(_overview(gathering)))
-    write_report(output, fleet_report(gathering), pdf)
+    write_report(output, partial(fleet_report, gathering), pdf)
     left_out = [{"folder": each.folder, "reason": each.reason} for each in gathering.left_out]
     output.manifest = {
         "command": "fleet",

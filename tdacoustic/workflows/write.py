@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,7 @@ if TYPE_CHECKING:
 
     from tdacoustic.campaign import Campaign
     from tdacoustic.reporting.document import Document
+    from tdacoustic.reporting.template import ReportTemplate
     from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
     from tdacoustic.steps import Record
     from tdacoustic.tables.prediction_file import ModelArrays
@@ -60,7 +62,7 @@ def write_analysis(analysis: Analysis, folder: OutputFolder, command: str, pdf: 
     with folder:
         _write_tables(folder, analysis.tables)
         _write_arrays(folder, analysis.campaign, analysis)
-        write_report(folder, in_template(analysis.campaign, measured_report(analysis)), pdf)
+        write_report(folder, partial(measured_report, analysis), pdf, _template_of(analysis.campaign))
         folder.manifest = _manifest(analysis, command)
 
 
@@ -88,7 +90,7 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder, pdf: bool = 
     with folder:
         _write_tables(folder, result.tables)
         write_prediction_file(folder.staging / ARRAYS, _model_arrays(result))
-        write_report(folder, predicted_report(result), pdf)
+        write_report(folder, partial(predicted_report, result), pdf)
         folder.manifest = {
             "command": "predict",
             "fleet": {"name": result.fleet.name},
@@ -116,7 +118,7 @@ def write_calibration(result: CampaignCalibration, folder: OutputFolder, pdf: bo
         _write_fit(folder, result)
         _write_tables(folder, _asked(result))
         _write_arrays(folder, result.campaign, result.analysis)
-        write_report(folder, in_template(result.campaign, calibration_report(result)), pdf)
+        write_report(folder, partial(calibration_report, result), pdf, _template_of(result.campaign))
         folder.manifest = {
             "command": "calibrate",
             "campaign": named(result.campaign, result.analysis),
@@ -152,7 +154,7 @@ def write_run(result: CampaignResult, folder: OutputFolder, read: FilesRead | No
         if prediction is not None:
             _write_tables(folder, prediction.tables)
         _write_arrays(folder, result.campaign, analysis, prediction)
-        write_report(folder, in_template(result.campaign, run_report(result)), pdf)
+        write_report(folder, partial(run_report, result), pdf, _template_of(result.campaign))
         folder.manifest = {
             **_manifest(analysis, "run"),
             **({} if analysis.fleet is None else {"fleet": {"name": analysis.fleet.name}}),
@@ -208,24 +210,39 @@ def _model_arrays(result: FleetPrediction) -> ModelArrays:
     return ModelArrays(fleet.name, result.prediction, fleet.radiation.max_frequency_hz.value)
 
 
-def in_template(campaign: Campaign, document: Document) -> Document:
-    """Return a report as the campaign's template wants it."""
+def _template_of(campaign: Campaign) -> ReportTemplate | None:
+    """How the campaign wants its reports."""
     if campaign.template is None:
-        return document
+        return None
     from tdacoustic.reporting.template import load_template
 
-    return load_template(campaign.template.path).applied(document)
+    return load_template(campaign.template.path)
 
 
-def write_report(folder: OutputFolder, document: Document, pdf: bool) -> None:
-    """Write a report into an output folder that is entered: the page, and where it is wanted the PDF."""
+def write_report(
+    folder: OutputFolder, make: Callable[[], Document], pdf: bool, template: ReportTemplate | None = None
+) -> None:
+    """Write a report into an output folder that is entered: the page, and where it is wanted the PDF.
+
+    Parameters
+    ----------
+    folder : OutputFolder
+    make : callable
+        Makes the report; it is called while the language of the template is spoken.
+    pdf : bool
+    template : ReportTemplate, optional
+        How a company wants it.
+    """
     from tdacoustic.reporting.html import render_html
+    from tdacoustic.reporting.language import ENGLISH, speaking
 
-    folder.write_text("report.html", render_html(document))
-    if pdf:
-        from tdacoustic.reporting.pdf import render_pdf
+    with speaking(ENGLISH if template is None else template.language):
+        document = make() if template is None else template.applied(make())
+        folder.write_text("report.html", render_html(document))
+        if pdf:
+            from tdacoustic.reporting.pdf import render_pdf
 
-        (folder.staging / PDF).write_bytes(render_pdf(document))
+            (folder.staging / PDF).write_bytes(render_pdf(document))
 
 
 def _manifest(analysis: Analysis, command: str) -> dict[str, Any]:

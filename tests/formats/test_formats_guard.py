@@ -263,6 +263,7 @@ SPINNING = """
 
 
 @POSIX
+@pytest.mark.usefixtures("hears_ctrl_c")
 def test_ctrl_c_ends_the_waiting_and_the_child(whole_log, tmp_path):
     (tmp_path / "other_scan.py").write_text(SPIN)
     process = program(SPINNING, whole_log, tmp_path, 60.0, OTHER_SCAN)

@@ -25,7 +25,7 @@ def test_the_pdf_is_in_the_manifest_by_its_hash_and_goes_when_it_is_not_asked_fo
     subject = tmp_path / "campaign.toml"
     for pdf in (True, False):
         with OutputFolder(tmp_path / "out", subject) as folder:
-            write_report(folder, report(), pdf)
+            write_report(folder, report, pdf)
         files = json.loads((tmp_path / "out/manifest.json").read_text(encoding="utf-8"))["files"]
         assert sorted(files) == (["report.html", "report.pdf"] if pdf else ["report.html"])
         assert (tmp_path / "out/report.pdf").exists() == pdf

@@ -339,6 +339,7 @@ def test_killed_it_leaves_no_process_and_goes_on(fresh, made):
 
 
 @NEEDS_PROC
+@pytest.mark.usefixtures("hears_ctrl_c")
 def test_interrupted_it_says_how_far_it_came_and_leaves_no_process(fresh, made):
     process = program(*ARGUMENTS, cwd=fresh)
     assert until(lambda: len(children_of(process.pid)) == 2, 60.0)

@@ -92,7 +92,7 @@ def _head(story: Story, document: Document, fonts: Fonts) -> None:
 def _logo(house: House) -> list[Flowable]:
     if not house.logo:
         return []
-    picture = Image(io.BytesIO(house.logo), hAlign=say("LEFT"), mask="auto")
+    picture = Image(io.BytesIO(house.logo), hAlign="LEFT", mask="auto")
     picture._restrictSize(*_LOGO)
     return [picture]
 

@@ -21,7 +21,6 @@ from reportlab.pdfgen.canvas import Canvas
 from reportlab.platypus import Flowable
 
 from tdacoustic.reporting.figure import Figure
-from tdacoustic.reporting.language import say
 from tdacoustic.reporting.matplotlib_renderer import draw_with, printed_size
 from tdacoustic.reporting.pdf.fonts import Fonts
 
@@ -107,7 +106,7 @@ class _Recorder(RendererBase):
     def get_text_width_height_descent(self, s: str, prop: FontProperties, ismath: Any) -> tuple[float, float, float]:
         """Return the size of a text as it will be shown, with signs that matplotlib's font lacks."""
         with warnings.catch_warnings():
-            warnings.filterwarnings("ignore", say("Glyph .* missing"))
+            warnings.filterwarnings("ignore", "Glyph .* missing")
             width, height, descent = super().get_text_width_height_descent(s, prop, ismath)
         if not self.fonts.simple(s):
             width = self.fonts.width(s, prop.get_size_in_points(), _is_bold(prop))
@@ -132,8 +131,8 @@ class _Recorder(RendererBase):
         """Keep a picture, in few colours: a quarter of the bytes."""
         with Image.fromarray(np.ascontiguousarray(im[::-1])) as picture:
             opacity = picture.getchannel("A").point([16 * round(level / 16) - (level > 247) for level in range(256)])
-            few = picture.convert(say("RGB")).quantize(96, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
-        shown = few.convert(say("RGB"))
+            few = picture.convert("RGB").quantize(96, method=Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+        shown = few.convert("RGB")
         if np.asarray(opacity).min() < 255:
             shown.putalpha(opacity)
         width, height = (side * 72.0 / self.dpi for side in shown.size)
@@ -206,12 +205,12 @@ def _pen(gc: GraphicsContextBase, filling: Any) -> list[str]:
     offset, dashes = cast("tuple[float | None, Sequence[float] | None]", gc.get_dashes())
     pattern = " ".join(_short(float(value)) for value in dashes or ())
     found = [
-        say("{short} RG", short=" ".join(_short(float(part)) for part in gc.get_rgb()[:3])),
+        f"{' '.join(_short(float(part)) for part in gc.get_rgb()[:3])} RG",
         f"{_short(gc.get_linewidth())} w {_CAPS[gc.get_capstyle()]} J {_JOINS[gc.get_joinstyle()]} j",
         f"[{pattern}] {_short(float(offset or 0))} d",
     ]
     if filling is not None:
-        found.append(say("{short} rg", short=" ".join(_short(float(part)) for part in filling[:3])))
+        found.append(f"{' '.join(_short(float(part)) for part in filling[:3])} rg")
     return found
 
 

@@ -21,6 +21,7 @@ from tdacoustic.reporting.language import say
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import REGULAR, Fonts, plain
 from tdacoustic.reporting.pdf.text import Anchored, style
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["ACROSS", "LOWEST", "UPRIGHT", "WIDTHS", "Book", "Contents"]
 
@@ -68,26 +69,16 @@ class Contents(TableOfContents):
         """Lay out what the pass before found; nothing in the first."""
         rows = [
             [
-                Paragraph(say('<a href="#{key}">{marked}</a>', key=key, marked=marked), style(f"contents-{depth}")),
-                Paragraph(say('<a href="#{key}">{page}</a>', key=key, page=page), style("page-number")),
+                Paragraph(f'<a href="#{key}">{marked}</a>', style(f"contents-{depth}")),
+                Paragraph(f'<a href="#{key}">{page}</a>', style("page-number")),
             ]
             for depth, marked, page, key in self._lastEntries
         ] or [["", ""]]
         self._table = Grid(rows, colWidths=[availWidth - 30.0, 30.0])
-        above = [
-            (say("TOPPADDING"), (0, at), (-1, at), 5.0) for at, entry in enumerate(self._lastEntries) if not entry[0]
-        ]
-        sides = [
-            (say("{side}PADDING", side=side), (0, 0), (-1, -1), 0.8)
-            for side in (say("LEFT"), say("RIGHT"), say("TOP"), say("BOTTOM"))
-        ]
+        above = [("TOPPADDING", (0, at), (-1, at), 5.0) for at, entry in enumerate(self._lastEntries) if not entry[0]]
+        sides = [(f"{side}PADDING", (0, 0), (-1, -1), 0.8) for side in ("LEFT", "RIGHT", "TOP", "BOTTOM")]
         self._table.setStyle(
-            [
-                (say("FONTNAME"), (0, 0), (-1, -1), REGULAR),
-                *sides,
-                *above,
-                (say("VALIGN"), (0, 0), (-1, -1), say("BOTTOM")),
-            ]
+            [("FONTNAME", (0, 0), (-1, -1), REGULAR), *sides, *above, ("VALIGN", (0, 0), (-1, -1), "BOTTOM")]
         )
         self.width, self.height = self._table.wrapOn(self.canv, availWidth, availHeight)
         return self.width, self.height
@@ -111,8 +102,8 @@ class Book(BaseDocTemplate):
             title=plain(document.title),
             subject=plain(document.subtitle),
             author="",
-            keywords=say("data: {origin}", origin=document.origin),
-            creator=say("tdacoustic {version}", version=__version__),
+            keywords=say("data: {origin}", origin=say(ORIGIN_WORDS[document.origin])),
+            creator=f"tdacoustic {__version__}",
             lang="en",
             invariant=1,
             pageCompression=1,
@@ -122,7 +113,7 @@ class Book(BaseDocTemplate):
         self.count = _PageCount()
         self._fonts = fonts
         self._whose = document.title
-        self._data = say("data: {origin}", origin=document.origin)
+        self._data = say("data: {origin}", origin=say(ORIGIN_WORDS[document.origin]))
         self.addPageTemplates([self._template(UPRIGHT, A4), self._template(ACROSS, landscape(A4))])
 
     def _template(self, name: str, size: tuple[float, float]) -> PageTemplate:
@@ -157,7 +148,7 @@ class Book(BaseDocTemplate):
         """Tell the contents of a heading."""
         if isinstance(flowable, Anchored) and flowable.entry is not None and flowable.entry[2]:
             depth, _, marked = flowable.entry
-            self.notify(say("TOCEntry"), (depth, marked, self.page, flowable.anchor))
+            self.notify("TOCEntry", (depth, marked, self.page, flowable.anchor))
 
     def _endBuild(self) -> None:
         super()._endBuild()

@@ -31,7 +31,7 @@ from tdacoustic.reporting.pdf.figures import kept_figure
 from tdacoustic.reporting.pdf.fonts import REGULAR, Fonts
 from tdacoustic.reporting.pdf.tables import MOST_ROWS, LeftTable, laid_out
 from tdacoustic.reporting.pdf.text import Anchored, markup, muted, style
-from tdacoustic.reporting.shown import NOTICE_WORDS
+from tdacoustic.reporting.shown import NOTICE_WORDS, ORIGIN_WORDS
 
 __all__ = ["Piece", "Story", "section_numbers"]
 
@@ -173,9 +173,7 @@ class Story:
         said = Paragraph(f"{word}\u2002{markup(notice.text, self._fonts)}", style("fact"))
         bar = HexColor(colour(_NOTICE_COLOURS.get(notice.kind, "series-7")))
         grid = LeftTable([[said]], colWidths=[self._widths[0]], splitInRow=1, spaceBefore=2.0, spaceAfter=4.0)
-        grid.setStyle(
-            [_FONT, (say("LINEBEFORE"), (0, 0), (0, -1), 2.5, bar), (say("LEFTPADDING"), (0, 0), (-1, -1), 8.0)]
-        )
+        grid.setStyle([_FONT, ("LINEBEFORE", (0, 0), (0, -1), 2.5, bar), ("LEFTPADDING", (0, 0), (-1, -1), 8.0)])
         self._put(grid, 40.0)
 
     def facts(self, facts: Sequence[Any]) -> None:
@@ -188,8 +186,8 @@ class Story:
         widths[1] = 0.92 * self._widths[0] - widths[0]
         grid = LeftTable(rows, colWidths=widths, splitInRow=1, spaceAfter=8.0)
         grid.setStyle(
-            [_FONT, (say("VALIGN"), (0, 0), (-1, -1), say("TOP")), (say("LEFTPADDING"), (0, 0), (-1, -1), 0.0)]
-            + [(say("{side}PADDING", side=side), (0, 0), (-1, -1), 1.2) for side in (say("TOP"), say("BOTTOM"))]
+            [_FONT, ("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0.0)]
+            + [(f"{side}PADDING", (0, 0), (-1, -1), 1.2) for side in ("TOP", "BOTTOM")]
         )
         self._put(grid, 40.0)
 
@@ -202,21 +200,14 @@ class Story:
 
     def _origin(self, origin: str | None) -> str:
         """An origin in words, as it follows what it is of."""
-        return f" {muted(markup(f'[{origin}]', self._fonts, bold=True))}" if origin else ""
+        return f" {muted(markup(f'[{say(ORIGIN_WORDS[origin])}]', self._fonts, bold=True))}" if origin else ""
 
     def _came_about(self) -> str:
         """The link to how something came about, as it ends a caption."""
         if self._behind is None:
             return ""
-        where = markup(
-            say("How it came about: {behind}", behind=self._numbers.get(self._behind, "")).rstrip(": "), self._fonts
-        )
-        return say(
-            ' <a href="#{behind}" color="{colour}">{where}</a>',
-            behind=self._behind,
-            colour=colour("series-0"),
-            where=where,
-        )
+        where = markup(f"{say('How it came about')}: {self._numbers.get(self._behind, '')}".rstrip(": "), self._fonts)
+        return f' <a href="#{self._behind}" color="{colour("series-0")}">{where}</a>'
 
     def _put(self, flowable: Flowable, need: float, across: bool = False) -> None:
         self.pieces.append(Piece(flowable, need, across))
@@ -265,7 +256,7 @@ class Story:
         marked = self._titled(figure.title, block.origin, figure.caption) + self._came_about()
         if is_thinned(figure):
             marked += muted(
-                markup(say(" Drawn with fewer points than the data have; every maximum is kept."), self._fonts)
+                markup(" " + say("Drawn with fewer points than the data have; every maximum is kept."), self._fonts)
             )
         caption = self._caption("figure", f"fig-{figure.name}", marked, "caption")
         picture = kept_figure(figure, self._fonts)
@@ -275,7 +266,7 @@ class Story:
 
     def _sound(self, block: Sound, depth: int) -> None:
         tracks = "; ".join(f"{track.label}: {track.text}" if track.text else track.label for track in block.tracks)
-        heard = say("To be heard in the HTML page: {rstrip}.", rstrip=tracks.rstrip("."))
+        heard = say("To be heard in the HTML page: {tracks}.", tracks=tracks.rstrip("."))
         marked = self._titled(block.title, block.origin, f"{block.caption} {heard}".strip()) + self._came_about()
         self._put(self._caption("sound", f"sound-{block.name}", marked, "caption"), 30.0)
 
@@ -287,20 +278,20 @@ class Story:
         for part in parts:
             if part.columns is not None:
                 words = say(
-                    "Columns {columns} to {columns_2} of {n_columns}.",
-                    columns=part.columns[0],
-                    columns_2=part.columns[1],
-                    n_columns=len(block.columns),
+                    "Columns {first} to {last} of {many}.",
+                    first=part.columns[0],
+                    last=part.columns[1],
+                    many=len(block.columns),
                 )
                 self._lead(Paragraph(markup(words, self._fonts), style("small")))
             self._put(part.flowable, part.start_height, part.across)
         rows = len(block.rows)
         if rows > MOST_ROWS:
             held = say(
-                "The first {most_rows} of {rows} rows; the HTML page has all and saves them as {csv_name}.",
-                most_rows=MOST_ROWS,
+                "The first {most} of {rows} rows; the HTML page has all and saves them as {file}.",
+                most=MOST_ROWS,
                 rows=rows,
-                csv_name=block.csv_name,
+                file=block.csv_name,
             )
             self._put(Paragraph(markup(held, self._fonts), style("small")), 0.0, parts[-1].across)
         elif not rows:

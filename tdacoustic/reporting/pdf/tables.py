@@ -40,7 +40,7 @@ class LeftTable(LongTable):
 
     def wrap(self, availWidth: float, availHeight: float) -> tuple[float, float]:
         """Lay it out."""
-        self.hAlign = say("LEFT")
+        self.hAlign = "LEFT"
         width, height = super().wrap(availWidth, availHeight)
         return width, height
 
@@ -191,14 +191,14 @@ def _paragraph(marked: str, align: str) -> Paragraph:
 
 def _head(column: Column, fonts: Fonts) -> Paragraph:
     title, unit = (cut_text(text, _MOST_IN_HEAD) for text in (column.title, column.unit))
-    below = say("<br/>{muted}", muted=muted(markup(unit, fonts))) if unit else ""
+    below = f"<br/>{muted(markup(unit, fonts))}" if unit else ""
     return _paragraph(f"{markup(title, fonts, bold=True)}{below}", _align(column))
 
 
 def _shortened(text: str) -> str:
     if len(text) <= MOST_SIGNS:
         return text
-    return say("{text}… ({most_signs} more signs)", text=text[:MOST_SIGNS], most_signs=len(text) - MOST_SIGNS)
+    return say("{text}\u2026 ({more} more signs)", text=text[:MOST_SIGNS], more=len(text) - MOST_SIGNS)
 
 
 def _cell(column: Column, cell: Cell, room: float, fonts: Fonts) -> Any:
@@ -206,13 +206,7 @@ def _cell(column: Column, cell: Cell, room: float, fonts: Fonts) -> Any:
     text = _shortened(cell_text(column, cell))
     if isinstance(cell, Link):
         return _paragraph(
-            say(
-                '<a href="{href}" color="{colour}">{markup}</a>',
-                href=cell.href,
-                colour=colour("series-0"),
-                markup=markup(text, fonts),
-            ),
-            _align(column),
+            f'<a href="{cell.href}" color="{colour("series-0")}">{markup(text, fonts)}</a>', _align(column)
         )
     if fonts.simple(text) and fonts.width(text, CELL) <= room:
         return text
@@ -228,17 +222,17 @@ def _height(cell: Any, room: float) -> float:
 def _look(columns: Sequence[Column], pad: float) -> list[tuple[Any, ...]]:
     line, head = HexColor(colour("grid")), HexColor(colour("axis"))
     look: list[tuple[Any, ...]] = [
-        (say("FONT"), (0, 0), (-1, -1), REGULAR, CELL, 8.8),
-        (say("TEXTCOLOR"), (0, 0), (-1, -1), HexColor(colour("ink"))),
-        (say("VALIGN"), (0, 0), (-1, 0), say("BOTTOM")),
-        (say("VALIGN"), (0, 1), (-1, -1), say("TOP")),
-        (say("TOPPADDING"), (0, 0), (-1, -1), 1.8),
-        (say("BOTTOMPADDING"), (0, 0), (-1, -1), 1.8),
-        (say("LEFTPADDING"), (0, 0), (-1, -1), pad),
-        (say("RIGHTPADDING"), (0, 0), (-1, -1), pad),
-        (say("LINEABOVE"), (0, 0), (-1, 0), 0.8, head),
-        (say("LINEBELOW"), (0, 0), (-1, 0), 0.8, head),
-        (say("LINEBELOW"), (0, 1), (-1, -1), 0.3, line),
+        ("FONT", (0, 0), (-1, -1), REGULAR, CELL, 8.8),
+        ("TEXTCOLOR", (0, 0), (-1, -1), HexColor(colour("ink"))),
+        ("VALIGN", (0, 0), (-1, 0), "BOTTOM"),
+        ("VALIGN", (0, 1), (-1, -1), "TOP"),
+        ("TOPPADDING", (0, 0), (-1, -1), 1.8),
+        ("BOTTOMPADDING", (0, 0), (-1, -1), 1.8),
+        ("LEFTPADDING", (0, 0), (-1, -1), pad),
+        ("RIGHTPADDING", (0, 0), (-1, -1), pad),
+        ("LINEABOVE", (0, 0), (-1, 0), 0.8, head),
+        ("LINEBELOW", (0, 0), (-1, 0), 0.8, head),
+        ("LINEBELOW", (0, 1), (-1, -1), 0.3, line),
     ]
-    look += [(say("ALIGN"), (i, 0), (i, -1), _align(column).upper()) for i, column in enumerate(columns)]
+    look += [("ALIGN", (i, 0), (i, -1), _align(column).upper()) for i, column in enumerate(columns)]
     return look

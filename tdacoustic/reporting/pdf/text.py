@@ -9,7 +9,6 @@ from xml.sax.saxutils import escape
 from reportlab.lib.styles import ParagraphStyle
 from reportlab.platypus import Paragraph
 
-from tdacoustic.reporting.language import say
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import BOLD, REGULAR, Fonts
 
@@ -76,15 +75,13 @@ def markup(text: str, fonts: Fonts, bold: bool = False) -> str:
     parts = []
     for font, part in fonts.runs(text, bold):
         safe = escape(part)
-        parts.append(
-            safe if font == own and not bold else say('<font name="{font}">{safe}</font>', font=font, safe=safe)
-        )
+        parts.append(safe if font == own and not bold else f'<font name="{font}">{safe}</font>')
     return "".join(parts)
 
 
 def muted(marked: str) -> str:
     """Return markup in the colour of what is said beside."""
-    return say('<font color="{muted}">{marked}</font>', muted=_MUTED, marked=marked)
+    return f'<font color="{_MUTED}">{marked}</font>'
 
 
 class Anchored(Paragraph):

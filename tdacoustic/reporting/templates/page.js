@@ -48,7 +48,7 @@
       button.className = "head";
       const words = head.querySelector(".words");
       button.textContent = words.textContent;
-      button.title = "Sort by this column";
+      button.title = document.body.dataset.sort;
       words.classList.add("on-paper");
       words.before(button);
       button.addEventListener("click", () => {
