@@ -28,6 +28,7 @@ __all__ = [
     "probability_words",
     "same_line",
     "slug",
+    "source_word",
     "speed_words",
     "tested_runs",
 ]
@@ -35,6 +36,14 @@ __all__ = [
 OWNER_SLOTS = {"motor": 0, "gearbox": 1, "ambiguous": 3, "unassigned": 7}
 """Colour of a source, the same in every figure."""
 OWNER_SLOT_OTHER = 2
+
+SOURCE_WORDS = {
+    "motor": mark("motor"),
+    "gearbox": mark("gearbox"),
+    "ambiguous": mark("ambiguous"),
+    "unassigned": mark("unassigned"),
+    "undecided": mark("undecided"),
+}
 
 UNKNOWN_SPEED = mark("speed not known")
 
@@ -98,6 +107,11 @@ def speed_words(run: MeasuredRun) -> str:
         if profile.source == "lines":
             words.append(say("read from lines"))
     return pretty_signs(", ".join(words)) or say(UNKNOWN_SPEED)
+
+
+def source_word(name: str) -> str:
+    """Name of a source as it is said; one that a fleet names itself stays as it is."""
+    return say(SOURCE_WORDS.get(name, name))
 
 
 def condition_words(analysis: Analysis, condition: str) -> str:
