@@ -17,6 +17,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from tdacoustic import __version__
+from tdacoustic.cli_options import (
+    Campaign,
+    Campaigns,
+    FetchUrls,
+    Jobs,
+    Logs,
+    ManyOut,
+    Out,
+    Overwrite,
+    Pdf,
+    Quiet,
+    Scheduler,
+    StorePath,
+    Template,
+)
 from tdacoustic.errors import TdacousticError
 
 if TYPE_CHECKING:
@@ -27,6 +42,7 @@ if TYPE_CHECKING:
     from tdacoustic.workflows.campaign_list import ListedCampaign
     from tdacoustic.workflows.output import OutputFolder
     from tdacoustic.workflows.run_many import ManyRuns
+    from tdacoustic.workflows.write import ReportTemplate
 
 __all__ = ["app", "main"]
 
@@ -38,49 +54,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-Campaign = Annotated[Path, typer.Argument(help="campaign.toml, or the folder it is in.", show_default=False)]
-Campaigns = Annotated[
-    list[Path] | None,
-    typer.Argument(
-        metavar="CAMPAIGN...", help="campaign.toml, or the folder it is in; a glob of either.", show_default=False
-    ),
-]
-Logs = Annotated[list[Path], typer.Argument(help="Logs: WAV, FLAC, HDF5, CSV, UFF 58.", show_default=False)]
-Out = Annotated[
-    Path | None, typer.Option("-o", "--out", help="Output folder.", show_default="reports/<folder of the campaign>")
-]
-ManyOut = Annotated[
-    Path | None,
-    typer.Option(
-        "-o",
-        "--out",
-        help="Output folder; of several campaigns, the folder of theirs.",
-        show_default="reports/<folder of the campaign>",
-    ),
-]
-Overwrite = Annotated[bool, typer.Option("--overwrite", help="Write over whatever is in the output folder.")]
-StorePath = Annotated[
-    Path | None,
-    typer.Option(
-        "--store", help="Where intermediate results are kept.", show_default="$TDACOUSTIC_STORE or the user cache"
-    ),
-]
-Jobs = Annotated[
-    int | None, typer.Option("--jobs", min=1, help="Processes.", show_default="one a core for large logs and housings")
-]
-Scheduler = Annotated[
-    str | None,
-    typer.Option(
-        "--scheduler",
-        metavar="ADDRESS",
-        help="Compute on the workers of this dask.distributed scheduler, as tcp://host:8786; trust it.",
-        show_default=False,
-    ),
-]
-Pdf = Annotated[bool, typer.Option("--pdf", help="Write report.pdf too: the report for paper.")]
-FetchUrls = Annotated[bool, typer.Option("--fetch-urls", help="Fetch logs that a campaign names by URL.")]
-Quiet = Annotated[bool, typer.Option("--quiet", help="Print errors alone.")]
 
 
 def _say(text: str) -> None:
@@ -165,6 +138,15 @@ def _check_pdf(wanted: bool) -> None:
     from tdacoustic.workflows.write import check_pdf
 
     check_pdf(wanted)
+
+
+def _template(path: Path | None) -> ReportTemplate | None:
+    """The template that an option names; what is wrong with it is said before anything is computed."""
+    if path is None:
+        return None
+    from tdacoustic.workflows.write import load_template
+
+    return load_template(path)
 
 
 def _warn(problems: Iterable[str], quiet: bool) -> None:
@@ -281,6 +263,7 @@ def predict(
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     pdf: Pdf = False,
+    template: Template = None,
     quiet: Quiet = False,
 ) -> None:
     """Compute the model of a fleet: gear dynamics, bearing forces, meshing noise, the housing and its sound."""
@@ -290,13 +273,14 @@ def predict(
     from tdacoustic.workflows.write import write_prediction
 
     _check_pdf(pdf)
+    layout = _template(template)
     loaded = load_fleet(fleet)  # a wrong fleet is said before anything else
     target = out or default_output(loaded.path)
     folder = OutputFolder(target, loaded.path, overwrite)
     executor = _executor(jobs, scheduler, quiet)
     with _progress(quiet) as progress:
         result = compute(loaded, store, progress, jobs=executor)
-    write_prediction(result, folder, pdf)
+    write_prediction(result, folder, pdf, layout)
     _warn(result.prediction.doubts, quiet)
     if not quiet:
         print(target / "report.html")
@@ -453,13 +437,15 @@ def fleet(
         bool, typer.Option("--check-all", help="Check every file of a result, its report and arrays too.")
     ] = False,
     pdf: Pdf = False,
+    template: Template = None,
     quiet: Quiet = False,
 ) -> None:
     """Gather the results of many campaigns: one dataset, one page, and what stands out."""
     from tdacoustic.workflows.fleet_view import fleet_view
 
+    layout = _template(template)
     with _progress(quiet) as progress:
-        found = fleet_view(folders, out, overwrite, train_key, date_key, check_all, progress, pdf)
+        found = fleet_view(folders, out, overwrite, train_key, date_key, check_all, progress, pdf, layout)
     left_out = [f"{each.folder} is left out: {each.reason}" for each in found.left_out]
     shown = left_out[:20]
     if len(left_out) > len(shown):

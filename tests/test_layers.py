@@ -52,7 +52,8 @@ ALLOWED = {
     "workflows": "gathering studies reporting tables results fitting drive gears attribution measured contributions "
     "orders tones railway steps quality lines spectra speed ingest campaign sensors fleet toml_models formats "
     "recording units errors",
-    "cli": "workflows synthesis results campaign fleet steps errors __version__",
+    "cli_options": "",
+    "cli": "cli_options workflows synthesis results campaign fleet steps errors __version__",
     "__main__": "cli",
     "__init__": "",
 }

@@ -51,10 +51,11 @@ SECTIONS: Final = frozenset(
         *("clocks", "quality", "levels", "spectra", "gear-pair", "mesh-stiffness", "transmission-error"),
         *("bearing-forces", "speed-sweep", "meshing-noise", "housing", "coupling", "sound-field"),
         *("insertion-loss", "what-if", "directivity", "near-field", "helix-sweep", "references", "design-sweeps"),
-        *("sensitivity", "model-parameters"),
+        *("sensitivity", "model-parameters", "listening"),
+        *("dominance", "parameters", "outliers", "data", "campaigns"),  # of the fleet view
     }
 )
-"""Sections of the reports on campaigns and fleets that a template may order or leave out."""
+"""Sections of the reports on campaigns and fleets, and of the fleet view, that a template may order or leave out."""
 
 _LOGO_TYPES: Final[Mapping[bytes, str]] = MappingProxyType(
     {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Final
 from tdacoustic.errors import GatheringError
 from tdacoustic.steps.record import versions
 from tdacoustic.workflows.output import OutputFolder
-from tdacoustic.workflows.write import check_pdf, write_report
+from tdacoustic.workflows.write import ReportTemplate, check_pdf, write_report
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,6 +35,7 @@ def fleet_view(
     check_all: bool = False,
     progress: Callable[[str, float, int], None] | None = None,
     pdf: bool = False,
+    template: ReportTemplate | None = None,
 ) -> Gathering:
     """Gather the results of campaigns in these folders and below into an output folder.
 
@@ -57,6 +58,8 @@ def fleet_view(
         Called with what is done, how much of it and of how much.
     pdf : bool
         Whether ``report.pdf`` is written too.
+    template : ReportTemplate, optional
+        How a company wants the page.
 
     Returns
     -------
@@ -92,7 +95,7 @@ def fleet_view(
         gathering = _gathered(usable, left_out, output, (train_key, date_key), progress)
         if not gathering.results:
             raise GatheringError(f"{words}: {_nothing(found, gathering.left_out)}")
-        _write(gathering, output, named, pdf)
+        _write(gathering, output, named, pdf, template)
     return gathering
 
 
@@ -161,12 +164,14 @@ def _gathered(
     return Gathering(tuple(results), tuple(left_out), compared(results), dataset.rows, links)
 
 
-def _write(gathering: Gathering, output: OutputFolder, named: Sequence[Path], pdf: bool) -> None:
+def _write(
+    gathering: Gathering, output: OutputFolder, named: Sequence[Path], pdf: bool, template: ReportTemplate | None
+) -> None:
     from tdacoustic.reporting.fleet_report import fleet_report
     from tdacoustic.tables import csv_text
 
     output.write_text(OVERVIEW, csv_text(_overview(gathering)))
-    write_report(output, partial(fleet_report, gathering), pdf)
+    write_report(output, partial(fleet_report, gathering), pdf, template)
     left_out = [{"folder": each.folder, "reason": each.reason} for each in gathering.left_out]
     output.manifest = {
         "command": "fleet",

@@ -7,6 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from tdacoustic.reporting.template import ReportTemplate, load_template
 from tdacoustic.workflows.named import named
 from tdacoustic.workflows.output import OutputFolder
 
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
     from tdacoustic.campaign import Campaign
     from tdacoustic.reporting.document import Document
-    from tdacoustic.reporting.template import ReportTemplate
     from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
     from tdacoustic.steps import Record
     from tdacoustic.tables.prediction_file import ModelArrays
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PDF",
+    "ReportTemplate",
     "check_pdf",
+    "load_template",
     "write_analysis",
     "write_calibration",
     "write_check",
@@ -73,7 +75,9 @@ def write_check(analysis: Analysis, out: Path, subject: Path, overwrite: bool) -
         folder.manifest = _manifest(analysis, "check")
 
 
-def write_prediction(result: FleetPrediction, folder: OutputFolder, pdf: bool = False) -> None:
+def write_prediction(
+    result: FleetPrediction, folder: OutputFolder, pdf: bool = False, template: ReportTemplate | None = None
+) -> None:
     """Write tables, ``result.h5`` and ``report.html`` of a prediction into an output folder.
 
     Parameters
@@ -83,6 +87,8 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder, pdf: bool = 
         Not entered yet.
     pdf : bool
         Whether ``report.pdf`` is written too.
+    template : ReportTemplate, optional
+        How a company wants the report.
     """
     from tdacoustic.reporting.predicted_report import predicted_report
     from tdacoustic.tables.prediction_file import write_prediction_file
@@ -90,7 +96,7 @@ def write_prediction(result: FleetPrediction, folder: OutputFolder, pdf: bool = 
     with folder:
         _write_tables(folder, result.tables)
         write_prediction_file(folder.staging / ARRAYS, _model_arrays(result))
-        write_report(folder, partial(predicted_report, result), pdf)
+        write_report(folder, partial(predicted_report, result), pdf, template)
         folder.manifest = {
             "command": "predict",
             "fleet": {"name": result.fleet.name},
@@ -212,11 +218,7 @@ def _model_arrays(result: FleetPrediction) -> ModelArrays:
 
 def _template_of(campaign: Campaign) -> ReportTemplate | None:
     """How the campaign wants its reports."""
-    if campaign.template is None:
-        return None
-    from tdacoustic.reporting.template import load_template
-
-    return load_template(campaign.template.path)
+    return None if campaign.template is None else load_template(campaign.template.path)
 
 
 def write_report(

@@ -17,6 +17,7 @@ from tdacoustic.reporting.sections.gear_words import (
     DIRECTION_SYMBOLS,
     by_speed,
     conditions_words,
+    gear_word,
     hertz,
     largest_line,
     newtons,
@@ -39,13 +40,16 @@ EDGE = 1.3
 SAME = 1e-3
 """Relative difference below which a sampling point is the line at it."""
 
-METHOD = mark(
-    "A force is what the shaft exerts on its bearings through their springs and dampers, K x + C x'. It is the total "
-    "of all bearings of a gear{split}. x lies along the line of centres, y is tangential, z lies along the shafts. "
-    "Amplitudes are peak values of a line."
+FORCE = mark("A force is what the shaft exerts on its bearings through their springs and dampers, K x + C x'.")
+NOT_SPLIT = mark(
+    "It is the total of all bearings of a gear: how it is split between the two bearings of a shaft is not modelled."
 )
-NOT_SPLIT = mark(": how it is split between the two bearings of a shaft is not modelled")
-SPLIT = mark("; only for the housing is it split between the two bearings of a shaft")
+SPLIT = mark(
+    "It is the total of all bearings of a gear; only for the housing is it split between the two bearings of a shaft."
+)
+AXES = mark(
+    "x lies along the line of centres, y is tangential, z lies along the shafts. Amplitudes are peak values of a line."
+)
 NOTHING_BETWEEN = mark(
     "The motion repeats with each mesh period, so it has nothing between the mesh harmonics: at the sampling points "
     "there the force is zero, which a logarithmic axis cannot show; crosses at its lower edge mark them. What the "
@@ -63,7 +67,7 @@ def bearing_loads(result: FleetPrediction) -> Section:
     states = by_speed(result.prediction.conditions)
     loaded = [state for state in states if largest_line(state) is not None]
     split = say(NOT_SPLIT) if result.prediction.housing is None else say(SPLIT)
-    blocks: list[Block] = [Paragraph(say(METHOD).format(split=split))]
+    blocks: list[Block] = [Paragraph(f"{say(FORCE)} {split} {say(AXES)}")]
     still = [state for state in states if state not in loaded]
     if still:
         without = say("without torque the teeth of the model do not touch, and there is no force")
@@ -83,9 +87,7 @@ def _spectra(result: FleetPrediction, loaded: list[GearState]) -> Section:
     blocks = _of_condition(result, shown)
     if others:
         rest = [state for state in loaded if state is not shown]
-        blocks.append(
-            Details(sentence(say("spectra of {conditions}", conditions=conditions_words(rest))).rstrip("."), others)
-        )
+        blocks.append(Details(say("Spectra of {conditions}", conditions=conditions_words(rest)), others))
     return Section("force-spectra", say("Spectra"), blocks)
 
 
@@ -100,13 +102,13 @@ def _words(state: GearState) -> str:
     assert largest is not None
     gear, direction, force, frequency = largest
     text = say(
-        "the largest line is {newtons} at {hertz} ({gear}, {direction}). ",
-        newtons=newtons(force),
-        hertz=hertz(frequency),
+        "the largest line is {force} at {frequency} ({gear}, {direction}).",
+        force=newtons(force),
+        frequency=hertz(frequency),
         gear=gear,
         direction=direction,
     )
-    return text + _between_words(state.steady)
+    return f"{text} {_between_words(state.steady)}"
 
 
 def _between_words(steady: SteadyState) -> str:
@@ -115,11 +117,11 @@ def _between_words(steady: SteadyState) -> str:
     if steady.repeats_after is None:
         return say(NOT_REPEATING)
     return say(
-        "The motion repeats only after {repeats_after} mesh periods, so it has lines at every "
-        "multiple of {hertz}, between the mesh harmonics too, and the sampling points there hold "
+        "The motion repeats only after {count} mesh periods, so it has lines at every "
+        "multiple of {frequency}, between the mesh harmonics too, and the sampling points there hold "
         "them.",
-        repeats_after=steady.repeats_after,
-        hertz=hertz(steady.mesh_hz / steady.repeats_after),
+        count=steady.repeats_after,
+        frequency=hertz(steady.mesh_hz / steady.repeats_after),
     )
 
 
@@ -138,15 +140,15 @@ def _figure(state: GearState, gear: int, highest_hz: float) -> Figure:
     name = GEARS[gear]
     return Figure(
         slug("spectrum", name, state.condition.name),
-        say("Forces on the bearings of the {name}, {state}", name=name, state=state_words(state)),
+        say("Forces on the bearings of the {gear}, {condition}", gear=gear_word(name), condition=state_words(state)),
         say(
-            "Lines up to {hertz}; those {decades} decades below the strongest are left out. The "
-            "sampling points of Fig. 9 are the mesh harmonics ({hertz_2}) and three between each two "
+            "Lines up to {highest}; those {decades} decades below the strongest are left out. The "
+            "sampling points of Fig. 9 are the mesh harmonics ({mesh}) and three between each two "
             "of them, each with the energy of the lines around it; a cross marks those that are not "
             "a line themselves, at the lower edge those without a force.",
-            hertz=hertz(highest_hz),
+            highest=hertz(highest_hz),
             decades=DECADES,
-            hertz_2=hertz(state.mesh_hz),
+            mesh=hertz(state.mesh_hz),
         ),
         Axis(say("Frequency"), "Hz", limits=(0.0, 1.02 * highest_hz)),
         Axis(say("Force"), "N", "log", limits=(bottom, 3.0 * top), note=say("peak amplitude")),
@@ -160,7 +162,7 @@ def _stems(frequencies: NDArray[np.float64], values: NDArray[np.float64], bottom
     tops = np.fmax.reduce(values, axis=0)
     gaps = np.full(tops.size, np.nan)
     y = np.stack([np.where(np.isfinite(tops), bottom, np.nan), tops, gaps], axis=1)
-    return Line(np.repeat(frequencies, 3), y.ravel(), "lines", color=7, width=1.0)
+    return Line(np.repeat(frequencies, 3), y.ravel(), say("lines"), color=7, width=1.0)
 
 
 def _sampled(state: GearState, gear: int, highest_hz: float, bottom: float) -> list[Markers]:
@@ -180,5 +182,5 @@ def _sampled(state: GearState, gear: int, highest_hz: float, bottom: float) -> l
     if np.isfinite(gathered).any():
         texts = [say("direction {direction}", direction=direction) for direction in DIRECTIONS for _ in points]
         x = np.tile(points, len(DIRECTIONS))
-        found.append(Markers(x, gathered.ravel(), "sampled", texts=texts, symbol="x", color=3))
+        found.append(Markers(x, gathered.ravel(), say("sampled"), texts=texts, symbol="x", color=3))
     return found

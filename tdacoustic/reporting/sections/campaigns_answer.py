@@ -11,12 +11,13 @@ from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.speed_bands import SpeedBand
 from tdacoustic.gathering.verdicts import Tally, tallies
 from tdacoustic.reporting.document import Block, Notice, Paragraph, Sentences
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.campaigns_dominance import matrix_width
 from tdacoustic.reporting.sections.campaigns_outliers import outlier_words
 from tdacoustic.reporting.sections.campaigns_quality import bad_words
-from tdacoustic.reporting.sections.campaigns_rows import plural
-from tdacoustic.reporting.sections.words import joined
+from tdacoustic.reporting.sections.campaigns_rows import campaigns_words, years_words
+from tdacoustic.reporting.sections.words import joined, source_word
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["campaigns_answer", "how_many"]
 
@@ -37,16 +38,14 @@ def campaigns_answer(gathering: Gathering) -> list[Block]:
         )
         blocks.append(Paragraph(words))
     if gathering.left_out:
-        count = len(gathering.left_out)
         first = gathering.left_out[0]
-        text = say(
-            "{plural} left out, among them {folder}: {reason}.",
-            plural=plural(count, "folder"),
+        text = say_count(
+            "One folder is left out: {folder}: {reason}.",
+            "{count} folders left out, among them {folder}: {reason}.",
+            len(gathering.left_out),
             folder=first.folder,
             reason=first.reason,
         )
-        if count == 1:
-            text = say("One folder is left out: {folder}: {reason}.", folder=first.folder, reason=first.reason)
         blocks.append(Notice("warning", text))
     return blocks
 
@@ -57,18 +56,22 @@ def how_many(gathering: Gathering) -> str:
     for origin in gathering.origins:
         results = gathering.of_origin(origin)
         if results:
-            parts.append(plural(len(results), say("{origin} campaign", origin=origin)))
+            parts.append(campaigns_words(len(results), origin))
     trains = {result.identity.train for result in gathering.results if result.identity.train}
-    years = sorted({result.identity.year for result in gathering.results if result.identity.year is not None})
+    years = {result.identity.year for result in gathering.results if result.identity.year is not None}
     fleets = {result.fleet for result in gathering.results if result.fleet}
-    said = joined(parts)
+    said = [joined(parts)]
     if trains:
-        said += say(" of {plural}", plural=plural(len(trains), "train"))
+        said = [
+            say_count(
+                "{campaigns} of {count} train", "{campaigns} of {count} trains", len(trains), campaigns=joined(parts)
+            )
+        ]
     if fleets:
-        said += f", {plural(len(fleets), 'fleet')}"
+        said.append(say_count("{count} fleet", "{count} fleets", len(fleets)))
     if years:
-        said += f", {years[0]}" if len(years) == 1 else say(", {years} to {years_2}", years=years[0], years_2=years[-1])
-    return f"{said}."
+        said.append(years_words(years))
+    return f"{', '.join(said)}."
 
 
 def _dominance(gathering: Gathering, origin: Origin) -> str:
@@ -82,47 +85,47 @@ def _dominance(gathering: Gathering, origin: Origin) -> str:
             counts[word] = counts.get(word, 0) + count
     named = sorted((item for item in counts.items() if item[0] != "undecided"), key=lambda item: -item[1])
     total = sum(counts.values())
-    parts = [say("the {word} in {count}", word=word, count=count) for word, count in named]
-    undecided = counts.get("undecided", 0)
+    parts = [say("the {source} in {count}", source=source_word(word), count=count) for word, count in named]
+    words = say(ORIGIN_WORDS[origin])
     if not parts:
-        return say(
-            "None of {plural} has a named source: all are undecided.",
-            plural=plural(total, say("{origin} condition", origin=origin)),
+        return say_count(
+            "None of {count} {origin} condition has a named source: all are undecided.",
+            "None of {count} {origin} conditions has a named source: all are undecided.",
+            total,
+            origin=words,
         )
-    said = say(
-        "Most of the noise lines' energy is of {parts} of {plural}",
-        parts=joined(parts),
-        plural=plural(total, say("{origin} condition", origin=origin)),
-    )
-    said += (
-        say(
-            " with a verdict; {undecided} {value} undecided.",
-            undecided=undecided,
-            value="is" if undecided == 1 else "are",
+    clauses = [
+        say_count(
+            "Most of the noise lines' energy is of {sources} of {count} {origin} condition with a verdict",
+            "Most of the noise lines' energy is of {sources} of {count} {origin} conditions with a verdict",
+            total,
+            sources=joined(parts),
+            origin=words,
         )
-        if undecided
-        else say(" with a verdict.")
-    )
-    return f"{said}{_over_speed(found)}"
+    ]
+    undecided = counts.get("undecided", 0)
+    if undecided:
+        clauses.append(say_count("{count} is undecided", "{count} are undecided", undecided))
+    return " ".join(part for part in (f"{'; '.join(clauses)}.", _over_speed(found)) if part)
 
 
 def _over_speed(found: Mapping[SpeedBand, Tally]) -> str:
-    """Where which source has more than half of the verdicts."""
+    """Where which source has more than half of the verdicts; empty where that says nothing."""
     parts = []
     for majority, bands in itertools.groupby(found.items(), key=lambda item: item[1].majority):
         held = [band for band, _ in bands]
         if majority:
             parts.append(
                 say(
-                    "the {majority} from {low:g} to {high:g} km/h",
-                    majority=majority,
+                    "the {source} from {low:g} to {high:g} km/h",
+                    source=source_word(majority),
                     low=held[0].low,
                     high=held[-1].high,
                 )
             )
     if len(found) < 2 or not parts:
         return ""
-    return say(" More than half of the verdicts name {parts}.", parts=joined(parts))
+    return say("More than half of the verdicts name {sources}.", sources=joined(parts))
 
 
 def _levels(gathering: Gathering, origin: Origin) -> str:
@@ -130,22 +133,23 @@ def _levels(gathering: Gathering, origin: Origin) -> str:
     if not points:
         return ""
     low, high = (pick(points, key=lambda point: point.level_db) for pick in (min, max))
+    words = say(ORIGIN_WORDS[origin])
     if len(points) == 1:
         return say(
-            "The one {origin} level at 4 m is {level_db:.1f} dB re 20 µPa at {speed_km_h:.0f} km/h.",
-            origin=origin,
-            level_db=high.level_db,
-            speed_km_h=high.speed_km_h,
+            "The one {origin} level at 4 m is {level:.1f} dB re 20 µPa at {speed:.0f} km/h.",
+            origin=words,
+            level=high.level_db,
+            speed=high.speed_km_h,
         )
     return say(
-        "The {n_points} {origin} levels at 4 m go from {level_db:.1f} dB re 20 µPa ({train}, "
-        "{speed_km_h:.0f} km/h) to {level_db_2:.1f} dB ({train_2}, {speed_km_h_2:.0f} km/h).",
-        n_points=len(points),
-        origin=origin,
-        level_db=low.level_db,
-        train=low.result.train,
-        speed_km_h=low.speed_km_h,
-        level_db_2=high.level_db,
-        train_2=high.result.train,
-        speed_km_h_2=high.speed_km_h,
+        "The {count} {origin} levels at 4 m go from {lowest:.1f} dB re 20 µPa ({lowest_train}, "
+        "{lowest_speed:.0f} km/h) to {highest:.1f} dB ({highest_train}, {highest_speed:.0f} km/h).",
+        count=len(points),
+        origin=words,
+        lowest=low.level_db,
+        lowest_train=low.result.train,
+        lowest_speed=low.speed_km_h,
+        highest=high.level_db,
+        highest_train=high.result.train,
+        highest_speed=high.speed_km_h,
     )

@@ -12,9 +12,10 @@ from tdacoustic.gathering.speed_bands import SpeedBand, band_width
 from tdacoustic.gathering.verdicts import Matrix, Row, Tally, has_verdict, tallies, verdict_rows
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, shown_of
-from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, probability_words
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, SHOWN_ROWS, campaigns_words, captioned, name_cell, shown_of
+from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, probability_words, source_word
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["MOST_BANDS", "campaigns_dominance", "matrix_width", "tally_words"]
 
@@ -23,6 +24,9 @@ MOST_BANDS: Final = 10
 
 _FEW: Final = 8
 """Verdicts up to which each whole number stands on the axis."""
+
+MIXED: Final = mark("mixed")
+"""What is said of verdicts of which none has more than half."""
 
 _EXPLAINED: Final = mark(
     "A cell is the verdict of the campaigns' own analyses: the source that has most of the sound energy in the noise "
@@ -53,15 +57,17 @@ def tally_words(tally: Tally | None) -> str | None:
     if tally is None or not tally.words:
         return None
     if len(tally.words) > 1:
-        counts = ", ".join(f"{word} {count}" for word, count in tally.words)
-        return counts if tally.majority else say("mixed: {counts}", counts=counts)
+        counts = ", ".join(f"{source_word(word)} {count}" for word, count in tally.words)
+        return counts if tally.majority else f"{say(MIXED)}: {counts}"
     word, count = tally.words[0]
-    if word == "undecided":
-        if count > 1:
-            return say("undecided ({count})", count=count)
-        leads = f": {tally.leading} {_sure(tally)}" if tally.leading else ""
-        return say("undecided{leads}", leads=leads)
-    return f"{word} {_sure(tally)}{f' ({count})' if count > 1 else ''}".replace("  ", " ").strip()
+    said = [source_word(word)]
+    if word != "undecided":
+        said.append(_sure(tally))
+    elif count == 1 and tally.leading:
+        said = [f"{said[0]}:", source_word(tally.leading), _sure(tally)]
+    if count > 1:
+        said.append(f"({count})")
+    return " ".join(part for part in said if part)
 
 
 def _sure(tally: Tally) -> str:
@@ -101,9 +107,9 @@ def _matrix(gathering: Gathering, rows: Matrix) -> Table:
         results, tally = rows[row]
         verdicts = [tally_words(tally.get(band)) for band in bands]
         cells.append([name_cell(gathering, results), row.origin, row.fleet or None, *verdicts])
-    left_out = shown_of(len(cells), len(names), "rows", "overview")
-    caption = say("Dominant source with its probability.{left_out}", left_out=left_out)
-    return Table("dominance-matrix", caption.rstrip("."), columns, cells)
+    left_out = shown_of(len(cells), len(names), SHOWN_ROWS, "overview")
+    caption = captioned(say("Dominant source with its probability"), left_out)
+    return Table("dominance-matrix", caption, columns, cells)
 
 
 def _figure(gathering: Gathering, origin: Origin, width: float) -> FigureBlock | None:
@@ -118,7 +124,7 @@ def _figure(gathering: Gathering, origin: Origin, width: float) -> FigureBlock |
         Bars(
             [band.words for band in found],
             np.array([float(held.get(word, 0)) for held in counts.values()]),
-            word,
+            source_word(word),
             color=OWNER_SLOTS.get(word, 7 if word == "undecided" else None),
         )
         for word in named
@@ -133,11 +139,12 @@ def _figure(gathering: Gathering, origin: Origin, width: float) -> FigureBlock |
     return FigureBlock(
         Figure(
             f"dominance-{origin}",
-            say("Verdicts by speed, {origin}", origin=origin),
-            say(
-                "{plural} of {plural_2}, one a condition.",
-                plural=plural(n, "verdict"),
-                plural_2=plural(len(results), say("{origin} campaign", origin=origin)),
+            say("Verdicts by speed, {origin}", origin=say(ORIGIN_WORDS[origin])),
+            say_count(
+                "{count} verdict of {campaigns}, one a condition.",
+                "{count} verdicts of {campaigns}, one a condition.",
+                n,
+                campaigns=campaigns_words(len(results), origin),
             ),
             Axis(say("Train speed"), "km/h"),
             Axis(say("Verdicts"), names=[str(count) for count in range(most + 1)] if most <= _FEW else ()),

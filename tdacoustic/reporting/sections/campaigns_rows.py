@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Final, TypeVar
 
 from tdacoustic.gathering.gathered import Gathering
+from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Cell, Link
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = [
     "MOST_POINTS",
     "MOST_ROWS",
+    "SHOWN_CAMPAIGNS",
+    "SHOWN_ROWS",
+    "campaigns_words",
+    "captioned",
     "name_cell",
-    "plural",
     "short",
     "shown_of",
     "spread_out",
     "when",
+    "years_words",
 ]
 
 MOST_ROWS: Final = 200
@@ -27,6 +33,9 @@ MOST_ROWS: Final = 200
 
 MOST_POINTS: Final = 2000
 """Single values of a figure."""
+
+SHOWN_ROWS: Final = mark("Shown are {shown} of {held} rows; all are in dataset/{table}.parquet.")
+SHOWN_CAMPAIGNS: Final = mark("Shown are {shown} of {held} campaigns; all are in dataset/{table}.parquet.")
 
 T = TypeVar("T")
 
@@ -44,15 +53,29 @@ def name_cell(gathering: Gathering, results: Sequence[GatheredResult]) -> Cell:
     return newest.train if link is None else Link(newest.train, link)
 
 
-def plural(count: int, one: str, many: str | None = None) -> str:
-    """Return a count with its noun.
+def campaigns_words(count: int, origin: Origin) -> str:
+    """Return how many campaigns of an origin.
 
     Examples
     --------
-    >>> plural(1, "campaign"), plural(3, "campaign")
-    ('1 campaign', '3 campaigns')
+    >>> campaigns_words(1, "printed"), campaigns_words(3, "measured")
+    ('1 printed campaign', '3 measured campaigns')
     """
-    return f"{count} {one if count == 1 else many or one + 's'}"
+    return say_count("{count} {origin} campaign", "{count} {origin} campaigns", count, origin=say(ORIGIN_WORDS[origin]))
+
+
+def years_words(years: Collection[int]) -> str:
+    """Return some years in words, from the first to the last; empty of none.
+
+    Examples
+    --------
+    >>> years_words({2021}), years_words({2021, 2019})
+    ('2021', '2019 to 2021')
+    """
+    if not years:
+        return ""
+    first, last = min(years), max(years)
+    return str(first) if first == last else say("{first} to {last}", first=first, last=last)
 
 
 def short(text: str, most: int = 28) -> str:
@@ -67,27 +90,36 @@ def short(text: str, most: int = 28) -> str:
     return plain if len(plain) <= most else f"{plain[: most - 1]}…"
 
 
-def shown_of(shown: int, held: int, what: str, table: str) -> str:
+def shown_of(shown: int, held: int, words: str, table: str) -> str:
     """Say what a table or figure leaves out; empty where it is nothing.
+
+    Parameters
+    ----------
+    shown, held : int
+    words : str
+        The sentence, such as `SHOWN_ROWS`.
+    table : str
+        Of the dataset, that has all.
 
     Examples
     --------
-    >>> shown_of(3, 3, "trains", "overview")
+    >>> shown_of(3, 3, SHOWN_ROWS, "overview")
     ''
-    >>> shown_of(200, 512, "trains", "overview")
-    ' Shown are 200 of 512 trains; all are in dataset/overview.parquet.'
+    >>> shown_of(200, 512, SHOWN_ROWS, "overview")
+    'Shown are 200 of 512 rows; all are in dataset/overview.parquet.'
     """
-    return (
-        ""
-        if shown >= held
-        else say(
-            " Shown are {shown} of {held} {what}; all are in dataset/{table}.parquet.",
-            shown=shown,
-            held=held,
-            what=what,
-            table=table,
-        )
-    )
+    return "" if shown >= held else say(words, shown=shown, held=held, table=table)
+
+
+def captioned(caption: str, left_out: str) -> str:
+    """Return the caption of a table with what the table leaves out, and no full stop at the end.
+
+    Examples
+    --------
+    >>> captioned("Levels", ""), captioned("Levels", "Shown are 200 of 512 rows.")
+    ('Levels', 'Levels. Shown are 200 of 512 rows')
+    """
+    return f"{caption}. {left_out.removesuffix('.')}" if left_out else caption
 
 
 def spread_out(values: Sequence[T], most: int = MOST_POINTS) -> list[T]:

@@ -21,6 +21,7 @@ from tdacoustic.reporting.sections.gear_words import (
     micrometres,
     motion_words,
     newtons,
+    range_words,
     sentence,
     significant,
     state_words,
@@ -44,14 +45,22 @@ SCOPE = mark(
 )
 SCOPE_WITH_HOUSING = mark(
     "Computed are the gears on their bearings, Masuda's meshing noise, the motor's tones as far as the fleet says "
-    "them, and the housing: what the bearing forces make it radiate, and how it scatters the sources beside it. The "
-    "bearing forces are those of bearings in a housing that {moves}."
+    "them, and the housing: what the bearing forces make it radiate, and how it scatters the sources beside it."
 )
+ONE_WAY = mark("The bearing forces are those of bearings in a housing that does not move.")
+TWO_WAY = mark("The bearing forces are those of bearings in a housing that gives way under them.")
 
 TERMS = mark(
     "DTE is the dynamic transmission error. Forces are the total of a gear's bearings, peak amplitudes of a line; x "
     "lies along the line of centres, y is tangential, z lies along the shafts."
 )
+
+_MODES = {
+    "traction": mark("traction"),
+    "brake": mark("brake"),
+    "coast": mark("coast"),
+    "hauled": mark("hauled"),
+}
 
 
 def gear_answer(result: FleetPrediction) -> list[Block]:
@@ -74,10 +83,8 @@ def gear_overview(result: FleetPrediction) -> Section:
 
 def _said(result: FleetPrediction) -> list[Block]:
     states = list(result.prediction.conditions)
-    moves = say("gives way under them") if result.fleet.model.coupling.value == "two_way" else say("does not move")
-    scope = say(SCOPE) if result.prediction.housing is None else say(SCOPE_WITH_HOUSING).format(moves=moves)
     blocks: list[Block] = [
-        Paragraph(f"{regime_words(result)} {scope}"),
+        Paragraph(f"{regime_words(result)} {_scope(result)}"),
         Sentences([_of_condition(result.fleet, state, sound_words(result, state)) for state in states]),
     ]
     if any(state.masuda_db is not None for state in states):
@@ -86,30 +93,32 @@ def _said(result: FleetPrediction) -> list[Block]:
     return [*blocks, Sentences(over)] if over else blocks
 
 
+def _scope(result: FleetPrediction) -> str:
+    """What is computed."""
+    if result.prediction.housing is None:
+        return say(SCOPE)
+    coupling = say(TWO_WAY) if result.fleet.model.coupling.value == "two_way" else say(ONE_WAY)
+    return f"{say(SCOPE_WITH_HOUSING)} {coupling}"
+
+
 def regime_words(result: FleetPrediction) -> str:
     """Say which regime is computed, and what the torque's sign means."""
     fleet, states = result.fleet, result.prediction.conditions
     torques = [state.condition.torque_n_m for state in states]
-    mode, low, high = fleet.operation.mode.value, min(torques), max(torques)
-    torque = (
-        torque_words(high)
-        if low == high
-        else say("{torque} to {torque_2}", torque=torque_words(low), torque_2=torque_words(high))
-    )
+    mode, low, high = say(_MODES[fleet.operation.mode.value]), min(torques), max(torques)
     if not low and not high:
-        text = say("Regime: {mode}, no torque, so that nothing presses the flanks of the teeth together.", mode=mode)
+        said = [say("Regime: {mode}, no torque, so that nothing presses the flanks of the teeth together.", mode=mode)]
     else:
         powers = sorted(1e-3 * state.condition.power_w for state in states)
-        ends = list(dict.fromkeys((significant(powers[0]), significant(powers[-1]))))
-        text = say(
-            "Regime: {mode}, {torque} of one motor, {law} ({ends} kW). ",
+        regime = say(
+            "Regime: {mode}, {torque} of one motor, {law} ({power} kW).",
             mode=mode,
-            torque=torque,
+            torque=range_words(torque_words(low), torque_words(high)),
             law=_law_words(result),
-            ends=" to ".join(ends),
+            power=range_words(significant(powers[0]), significant(powers[-1])),
         )
-        text += _sign_words(states)
-    return f"{text} {_of_the_test(result)}".strip()
+        said = [regime, _sign_words(states)]
+    return " ".join([*said, *_of_the_test(result)])
 
 
 def _law_words(result: FleetPrediction) -> str:
@@ -121,80 +130,71 @@ def _law_words(result: FleetPrediction) -> str:
     except FleetError:
         return stated
     held = [math.isclose(c.torque_n_m, law, rel_tol=1e-9) for c, law in zip(conditions, of_law, strict=True)]
-    return (
-        law_words(fleet)
-        if all(held)
-        else say("{law} or {stated}", law=law_words(fleet), stated=stated)
-        if any(held)
-        else stated
-    )
+    if all(held):
+        return law_words(fleet)
+    return say("{law} or as the runs state it", law=law_words(fleet)) if any(held) else stated
 
 
 def _sign_words(states: tuple[GearState, ...]) -> str:
     drive = [state for state in states if state.condition.torque_n_m > 0.0]
     coast = [state for state in states if state.condition.torque_n_m < 0.0]
-    up = say("the motor drives the wheelset and the drive flanks carry")
-    down = say("the wheelset drives the motor and the coast flanks carry")
-    if not coast or not drive:
-        return say("{value} zero {up}.", value=say("Above") if drive else say("Below"), up=up if drive else down)
-    return sentence(
-        say(
-            "in {conditions} {up}, in {conditions_2} {down}",
-            conditions=conditions_words(drive),
-            up=up,
-            conditions_2=conditions_words(coast),
-            down=down,
-        )
+    if not coast:
+        return say("Above zero the motor drives the wheelset and the drive flanks carry.")
+    if not drive:
+        return say("Below zero the wheelset drives the motor and the coast flanks carry.")
+    return say(
+        "In {driving} the motor drives the wheelset and the drive flanks carry, in {coasting} the wheelset drives the "
+        "motor and the coast flanks carry.",
+        driving=conditions_words(drive),
+        coasting=conditions_words(coast),
     )
 
 
-def _of_the_test(result: FleetPrediction) -> str:
+def _of_the_test(result: FleetPrediction) -> list[str]:
     """What the paper's test was, for a fleet that is the paper's."""
     if not is_of_the_paper(result.fleet):
-        return ""
+        return []
     unit, states = result.prediction.unit, result.prediction.conditions
-    text = say(
-        "In the test of the paper ({paper}, section 3.1) another locomotive hauled this one, so "
-        "that the gears carried drag only, on the coast flanks; how much is not printed.",
-        paper=say(PAPER),
-    )
+    said = [
+        say(
+            "In the test of the paper ({paper}, section 3.1) another locomotive hauled this one, so "
+            "that the gears carried drag only, on the coast flanks; how much is not printed.",
+            paper=say(PAPER),
+        )
+    ]
     loads = [unit.line_load_n_per_m(state.condition.torque_n_m) for state in states]
     if min(loads) >= LOW_LOAD_N_PER_M:
-        return say("{text} The load computed here is another regime than that of the test.", text=text)
-    return text
+        said.append(say("The load computed here is another regime than that of the test."))
+    return said
 
 
 def _of_condition(fleet: Fleet, state: GearState, around: str) -> str:
     condition, steady = state.condition, state.steady
     start = say(
-        "{state}: mesh frequency {hertz}, {torque}",
-        state=state_words(state),
-        hertz=hertz(state.mesh_hz),
+        "{condition}: mesh frequency {frequency}, {torque}",
+        condition=state_words(state),
+        frequency=hertz(state.mesh_hz),
         torque=_torque(condition.torque_n_m),
     )
     if steady.method == "at_rest":
         rest = say("the teeth of the model do not touch, so there is no vibration, no force and no meshing noise")
         return sentence("; ".join(part for part in (start, rest, around) if part))
-    parts = [say("DTE {micrometres} peak to peak", micrometres=micrometres(steady.dte_pp_m))]
+    parts = [say("DTE {length} peak to peak", length=micrometres(steady.dte_pp_m))]
     largest = largest_line(state)
     if largest is not None:
         gear, direction, force, frequency = largest
         parts.append(
             say(
-                "largest bearing force {newtons} at {hertz} ({gear}, {direction})",
-                newtons=newtons(force),
-                hertz=hertz(frequency),
+                "largest bearing force {force} at {frequency} ({gear}, {direction})",
+                force=newtons(force),
+                frequency=hertz(frequency),
                 gear=gear,
                 direction=direction,
             )
         )
     if state.masuda_db is not None:
         parts.append(
-            say(
-                "Masuda's level {masuda_db:.1f} {level_unit} at 1 m",
-                masuda_db=state.masuda_db,
-                level_unit=level_unit(fleet),
-            )
+            say("Masuda's level {level:.1f} {unit} at 1 m", level=state.masuda_db, unit=level_unit(fleet))
         )
     parts += [around] if around else []
     return sentence(f"{start}; {', '.join(parts)}. {sentence(motion_words(steady))}")

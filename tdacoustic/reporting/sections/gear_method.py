@@ -2,21 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from tdacoustic.gears import SteadyState
 from tdacoustic.gears.harmonic_balance import FEWEST_HARMONICS, RESIDUAL, TAIL
 from tdacoustic.gears.integration import LONGEST_REPEAT, MOST_PERIODS, RECORD_PERIODS, SETTLED
 from tdacoustic.gears.sweep import SWEEP_PERIODS
 from tdacoustic.reporting.document import Paragraph, Section, Sentences
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.sections.gear_words import range_words
 from tdacoustic.reporting.sections.printed import PAPER
 from tdacoustic.reporting.sections.provenance import inputs_of, steps_of, versions_of
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["gear_method", "method_sections"]
 
-EQUATIONS = (
+EQUATIONS = mark(
     "The gears are two rigid bodies on linear springs and dampers, coupled by one mesh with a gap (equations (1) to "
-    f"(6) of {PAPER}). All but the mesh force is linear, so a periodic motion is one scalar balance of harmonics in δ."
+    "(6) of {paper}). All but the mesh force is linear, so a periodic motion is one scalar balance of harmonics in δ."
+)
+BALANCE = mark(
+    "It is solved for {fewest} harmonics or as many more as bring the estimated error of δ by those left out below "
+    "{tail} of its peak to peak, to a residual of {residual}; where teeth separate by Newton's method, with the force "
+    "taken from samples over the period. The largest Floquet multiplier of each solution says whether it is stable; "
+    "the rigid rotation is taken out before."
+)
+INTEGRATION = mark(
+    "Where no stable one is found the equations are integrated in time, with the contact lines as the printed "
+    "trapezoid, until the motion repeats after at most {longest_repeat} mesh periods within {settled} of its peak to "
+    "peak; after {most_periods} mesh periods ({sweep_periods} in the sweep) a motion counts as not repeating, and its "
+    "lines are those of a record of up to {record_periods} mesh periods."
 )
 
 
@@ -41,28 +56,20 @@ def method_sections(result: FleetPrediction) -> list[Section]:
 
 def _method(result: FleetPrediction) -> str:
     states = [state.steady for state in result.prediction.conditions]
-    text = say(
-        "{equations} It is solved for {fewest_harmonics} harmonics or as many more as bring the "
-        "estimated error of δ by those left out below {small} of its peak to peak, to a residual "
-        "of {small_2}; where teeth separate by Newton's method, with the force taken from "
-        "samples over the period. The largest Floquet multiplier of each solution says whether "
-        "it is stable; the rigid rotation is taken out before. Where no stable one is found the "
-        "equations are integrated in time, with the contact lines as the printed trapezoid, "
-        "until the motion repeats after at most {longest_repeat} mesh periods within {small_3} "
-        "of its peak to peak; after {most_periods} mesh periods ({sweep_periods} in the sweep) a "
-        "motion counts as not repeating, and its lines are those of a record of up to "
-        "{record_periods} mesh periods. Bearing forces follow line by line from the mesh force.",
-        equations=EQUATIONS,
-        fewest_harmonics=FEWEST_HARMONICS,
-        small=_small(TAIL),
-        small_2=_small(RESIDUAL),
-        longest_repeat=LONGEST_REPEAT,
-        small_3=_small(SETTLED),
-        most_periods=MOST_PERIODS,
-        sweep_periods=SWEEP_PERIODS,
-        record_periods=RECORD_PERIODS,
-    )
-    return f"{text} {_harmonics_words(states)}".strip()
+    said = [
+        say(EQUATIONS, paper=say(PAPER)),
+        say(BALANCE, fewest=FEWEST_HARMONICS, tail=_small(TAIL), residual=_small(RESIDUAL)),
+        say(
+            INTEGRATION,
+            longest_repeat=LONGEST_REPEAT,
+            settled=_small(SETTLED),
+            most_periods=MOST_PERIODS,
+            sweep_periods=SWEEP_PERIODS,
+            record_periods=RECORD_PERIODS,
+        ),
+        say("Bearing forces follow line by line from the mesh force."),
+    ]
+    return f"{' '.join(said)} {_harmonics_words(states)}".strip()
 
 
 def _small(value: float) -> str:
@@ -71,24 +78,42 @@ def _small(value: float) -> str:
 
 def _split_words(result: FleetPrediction) -> str:
     if result.prediction.housing is None:
-        return say("nothing is split between the two bearings of a shaft")
-    return say("their forces are split between the two bearings of a shaft for the housing alone, by the lever rule")
+        return say(
+            "Springs and dampers are the total of a gear's bearings; nothing is split between the two bearings of a "
+            "shaft."
+        )
+    return say(
+        "Springs and dampers are the total of a gear's bearings; their forces are split between the two bearings of a "
+        "shaft for the housing alone, by the lever rule."
+    )
 
 
 def _harmonics_words(states: list[SteadyState]) -> str:
     found = sorted({s.lines.harmonic.size for s in states if s.method == "harmonic_balance"})
     if not found:
         return ""
-    most = say("{found} to {found_2}", found=found[0], found_2=found[-1]) if len(found) > 1 else f"{found[0]}"
-    return say("In these conditions the balanced solutions have lines at {most} mesh harmonics.", most=most)
+    count = range_words(f"{found[0]}", f"{found[-1]}")
+    return say("In these conditions the balanced solutions have lines at {count} mesh harmonics.", count=count)
+
+
+def _error_words(amplitudes_m: Sequence[float]) -> str:
+    """What the transmission error of the unloaded gears is."""
+    listed = ", ".join(f"{1e6 * amplitude:g}" for amplitude in amplitudes_m)
+    if len(amplitudes_m) == 1:
+        return say(
+            "The transmission error of the unloaded gears is a sine at the mesh frequency, amplitude {amplitude} µm, "
+            "phase 0, at any speed and load.",
+            amplitude=listed,
+        )
+    return say(
+        "The transmission error of the unloaded gears is sines at the first mesh harmonics, amplitudes {amplitudes} "
+        "µm, phase 0, at any speed and load.",
+        amplitudes=listed,
+    )
 
 
 def _assumptions(result: FleetPrediction) -> list[str]:
     unit, fleet = result.prediction.unit, result.fleet
-    amplitudes = unit.system.transmission_error_m
-    error = ", ".join(f"{1e6 * amplitude:g}" for amplitude in amplitudes)
-    waves = say("a sine at the mesh frequency") if len(amplitudes) == 1 else say("sines at the first mesh harmonics")
-    where = "amplitude" if len(amplitudes) == 1 else "amplitudes"
     damping = (
         say("The damping of the mesh acts always, also while the teeth are apart, as the paper prints it.")
         if unit.system.mesh_damping == "always"
@@ -97,28 +122,17 @@ def _assumptions(result: FleetPrediction) -> list[str]:
     found = [
         say(
             "The centres lie along x (ψ = 0), so that y is tangential; with the angle of the paper's text taken "
-            "otherwise "
-            "the force along x would vanish."
+            "otherwise the force along x would vanish."
         ),
         say("The working transverse pressure angle stands for the pressure angle in the direction of the mesh force."),
-        say(
-            "The transmission error of the unloaded gears is {waves}, {where} {error} µm, phase 0, "
-            "at any speed and load.",
-            waves=waves,
-            where=where,
-            error=error,
-        ),
-        say(
-            "The backlash is {half_backlash_m:g} µm, the same at every tooth.",
-            half_backlash_m=2000000.0 * unit.system.half_backlash_m,
-        ),
-        say("Springs and dampers are the total of a gear's bearings; {split}.", split=_split_words(result)),
+        _error_words(unit.system.transmission_error_m),
+        say("The backlash is {backlash:g} µm, the same at every tooth.", backlash=2e6 * unit.system.half_backlash_m),
+        _split_words(result),
         damping,
         say("Gears are of steel, with solid discs; the mean stiffness of the mesh does not change with the load."),
         say(
-            "No friction between the teeth, no bending or torsion of the shafts, no tilt of the gears, no tip "
-            "relief or "
-            "other flank correction, no scatter between teeth."
+            "No friction between the teeth, no bending or torsion of the shafts, no tilt of the gears, no tip relief "
+            "or other flank correction, no scatter between teeth."
         ),
         say(
             "The torque is constant over a turn, and that of the wheel balances it; motor and wheelset add no inertia "

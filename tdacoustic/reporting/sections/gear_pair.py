@@ -41,21 +41,22 @@ MODES = mark(
 def _method(result: FleetPrediction) -> str:
     unit, fleet = result.prediction.unit, result.fleet
     pair = fleet.modelled_pair
-    text = say("Geometry by ISO 21771, without play in the centre distance, tips not shortened. ")
+    said = [say("Geometry by ISO 21771, without play in the centre distance, tips not shortened.")]
     if pair.helix_angle_deg is None:
-        text += say("The helix angle follows from the centre distance. ")
+        said.append(say("The helix angle follows from the centre distance."))
     elif pair.centre_distance_mm is None:
-        text += say("The centre distance follows from the helix angle. ")
+        said.append(say("The centre distance follows from the helix angle."))
     if len(fleet.gear_pair) > 1:
-        text += say(
-            "Of {n_gear_pair} gear pairs in series, {pair} is computed; ",
-            n_gear_pair=len(fleet.gear_pair),
-            pair=unit.pair,
+        said.append(
+            say(
+                "Of {count} gear pairs in series, {pair} is computed; its pinion turns {turns:.4g} times a turn of the "
+                "motor.",
+                count=len(fleet.gear_pair),
+                pair=unit.pair,
+                turns=1.0 / unit.motor_turns,
+            )
         )
-        text += say(
-            "its pinion turns {motor_turns:.4g} times a turn of the motor. ", motor_turns=1.0 / unit.motor_turns
-        )
-    return text.strip()
+    return " ".join(said)
 
 
 def _gears(unit: GearUnit) -> Table:
@@ -142,8 +143,11 @@ def _modes(result: FleetPrediction) -> Table:
     columns = (
         Column("mode", say("Mode")),
         Column("natural_frequency_hz", say("Natural"), "Hz", 1, "number"),
-        *(Column(f"mesh_{n}_km_h", say("Mesh x{n}", n=n), say("meets it at km/h"), 1, "number") for n in HARMONICS),
-        Column("conditions", say("Conditions within {near:.0f} %", near=100 * NEAR)),
+        *(
+            Column(f"mesh_{n}_km_h", say("Mesh x{harmonic}", harmonic=n), say("meets it at km/h"), 1, "number")
+            for n in HARMONICS
+        ),
+        Column("conditions", say("Conditions within {percent:.0f} %", percent=100 * NEAR)),
     )
     caption = say("Natural frequencies, teeth in contact, bearing seats that do not move")
     return Table("modes", caption, columns, rows, origin="calculated")

@@ -12,7 +12,7 @@ from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
 from tdacoustic.gears import DIRECTIONS, GEARS, SteadyState
 from tdacoustic.reporting.figure import Symbol
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count, spoken
 from tdacoustic.reporting.sections.printed import FIGURE_11_CONDITION, is_of_the_paper, printed_of
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
@@ -20,10 +20,12 @@ from tdacoustic.results import FleetPrediction
 __all__ = [
     "DIRECTION_SLOTS",
     "DIRECTION_SYMBOLS",
+    "begun_small",
     "by_speed",
     "conditions_words",
     "first_harmonic_n",
     "flank_words",
+    "gear_word",
     "hertz",
     "largest_line",
     "law_words",
@@ -31,7 +33,9 @@ __all__ = [
     "micrometres",
     "motion_cells",
     "motion_words",
+    "named_conditions",
     "newtons",
+    "range_words",
     "sentence",
     "shown_state",
     "significant",
@@ -51,6 +55,7 @@ _LAWS = {
     "running_resistance": mark("from the running resistance"),
     "table": mark("from the fleet's table over speed"),
 }
+_GEAR_WORDS = {"pinion": mark("pinion"), "wheel": mark("wheel")}
 
 
 def significant(value: float, digits: int = 3) -> str:
@@ -101,6 +106,30 @@ def sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!')) else '.'}"
 
 
+def begun_small(text: str) -> str:
+    """Return a text that is a sentence or a heading as it stands within a sentence.
+
+    In another language than English it stays as it is: there a noun may begin with a capital anywhere.
+    """
+    return f"{text[:1].lower()}{text[1:]}" if spoken().code.startswith("en") else text
+
+
+def range_words(low: str, high: str) -> str:
+    """Return two numbers as a range, equal ones as one.
+
+    Examples
+    --------
+    >>> range_words("0.5", "0.9"), range_words("0.5", "0.5")
+    ('0.5 to 0.9', '0.5')
+    """
+    return low if low == high else say("{low} to {high}", low=low, high=high)
+
+
+def gear_word(gear: str) -> str:
+    """Return the name of one of `GEARS` as it is said."""
+    return say(_GEAR_WORDS[gear])
+
+
 def by_speed(states: Sequence[GearState]) -> list[GearState]:
     """Return the conditions by mesh frequency."""
     return sorted(states, key=lambda state: state.mesh_hz)
@@ -109,16 +138,18 @@ def by_speed(states: Sequence[GearState]) -> list[GearState]:
 def state_words(state: GearState) -> str:
     """Return a condition's name with its speed."""
     return say(
-        "condition {name} ({train_speed_km_h:.4g} km/h)",
-        name=state.condition.name,
-        train_speed_km_h=state.condition.train_speed_km_h,
+        "condition {name} ({speed:.4g} km/h)", name=state.condition.name, speed=state.condition.train_speed_km_h
     )
 
 
 def conditions_words(states: Sequence[GearState]) -> str:
     """Return several conditions by name."""
-    names = joined([state.condition.name for state in states])
-    return say("condition{value} {names}", value="s" if len(states) > 1 else "", names=names)
+    return named_conditions([state.condition.name for state in states])
+
+
+def named_conditions(names: Sequence[str]) -> str:
+    """Return names of conditions, one or several, as they are said."""
+    return say_count("condition {names}", "conditions {names}", len(names), names=joined(names))
 
 
 def shown_state(result: FleetPrediction) -> GearState:
@@ -161,35 +192,35 @@ def motion_words(steady: SteadyState) -> str:
     elif steady.repeats_after == 1:
         repeats = say("periodic with the mesh")
     else:
-        repeats = say("the motion repeats only after {repeats_after} mesh periods", repeats_after=steady.repeats_after)
-    apart = say(
-        "teeth are apart {significant} % of the time", significant=significant(100.0 * (1.0 - steady.contact_part), 2)
+        repeats = say("the motion repeats only after {count} mesh periods", count=steady.repeats_after)
+    contact = (
+        say("teeth are apart {percent} % of the time", percent=significant(100.0 * (1.0 - steady.contact_part), 2))
+        if steady.separates
+        else say("teeth stay in contact")
     )
-    return f"{method}: {repeats}, {apart if steady.separates else 'teeth stay in contact'}"
+    return f"{method}: {repeats}, {contact}"
 
 
 def motion_cells(steady: SteadyState) -> tuple[str, str]:
     """Return what a motion is and how it was found, short enough for a table."""
     if steady.method == "at_rest":
         return say("at rest"), ""
-    method = "balance" if steady.method == "harmonic_balance" else "integration"
+    method = say("balance") if steady.method == "harmonic_balance" else say("integration")
     if steady.repeats_after is None:
         return say("does not repeat"), method
-    return (
-        say("every {repeats_after} periods", repeats_after=steady.repeats_after)
-        if steady.repeats_after > 1
-        else "periodic"
-    ), method
+    if steady.repeats_after == 1:
+        return say("periodic"), method
+    return say("every {count} periods", count=steady.repeats_after), method
 
 
 def largest_line(state: GearState) -> tuple[str, str, float, float] | None:
-    """Return gear, direction, amplitude in N and frequency in Hz of the largest bearing force line, or None of none."""
+    """Return the largest line of the bearing forces: the gear as it is said, direction, N, Hz; None of no line."""
     amplitude = np.abs(state.forces.amplitude_n)
     if not amplitude.size:
         return None
     gear, direction, line = np.unravel_index(int(amplitude.argmax()), amplitude.shape)
     force, frequency = float(amplitude[gear, direction, line]), float(state.forces.frequency_hz[line])
-    return GEARS[int(gear)], DIRECTIONS[int(direction)], force, frequency
+    return gear_word(GEARS[int(gear)]), DIRECTIONS[int(direction)], force, frequency
 
 
 def first_harmonic_n(state: GearState) -> NDArray[np.float64]:

@@ -26,7 +26,14 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Figure, Line
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, first_harmonic_n, hertz, newtons, sentence
+from tdacoustic.reporting.sections.gear_words import (
+    DIRECTION_SLOTS,
+    first_harmonic_n,
+    gear_word,
+    hertz,
+    newtons,
+    sentence,
+)
 from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
@@ -89,7 +96,10 @@ def _figure(loaded: Sequence[GearState], first: NDArray[np.float64], gear: int) 
     ]
     return Figure(
         f"forces-{GEARS[gear]}",
-        say("First mesh harmonic of the forces on the bearings of the {gears} over the conditions", gears=GEARS[gear]),
+        say(
+            "First mesh harmonic of the forces on the bearings of the {gear} over the conditions",
+            gear=gear_word(GEARS[gear]),
+        ),
         say("One dot a condition; the lines between them only lead the eye."),
         Axis(say("Mesh frequency"), "Hz"),
         Axis(say("Force"), "N", "log", note=say("peak amplitude")),
@@ -104,21 +114,24 @@ def largest_words(loaded: Sequence[GearState]) -> str:
     counts = [
         joined(
             [
-                say("{count} of {n_loaded} conditions ({gear})", count=count, n_loaded=len(loaded), gear=gear)
+                say("{count} of {all} conditions ({gear})", count=count, all=len(loaded), gear=gear_word(gear))
                 for count, gear in zip(counted, GEARS, strict=True)
             ]
         )
         for counted in (first, whole)
     ]
     if first == whole:
-        where = say("both at the mesh frequency and by the rms of all lines in {counts}", counts=counts[0])
-    else:
-        where = say(
-            "at the mesh frequency in {counts}, by the rms of all lines in {counts_2}",
+        return say(
+            "the tangential force (y) is the largest of the three both at the mesh frequency and by the rms of all "
+            "lines in {counts}",
             counts=counts[0],
-            counts_2=counts[1],
         )
-    return say("the tangential force (y) is the largest of the three {where}", where=where)
+    return say(
+        "the tangential force (y) is the largest of the three at the mesh frequency in {counts_at_mesh}, by the rms of "
+        "all lines in {counts_by_rms}",
+        counts_at_mesh=counts[0],
+        counts_by_rms=counts[1],
+    )
 
 
 def _y_is_largest(values: NDArray[np.float64]) -> list[int]:
@@ -134,19 +147,27 @@ def _rms(loaded: Sequence[GearState]) -> NDArray[np.float64]:
 def rise_words(loaded: Sequence[GearState]) -> str:
     """Say for which gears and directions the first mesh harmonic rises, then falls; empty of too few speeds."""
     courses = {
-        f"{gear} {direction}": _course(loaded, values)[0]
+        _force_word(gear, direction): _course(loaded, values)[0]
         for gear, of_gear in zip(GEARS, _over_conditions(loaded), strict=True)
         for direction, values in zip(DIRECTIONS, of_gear, strict=True)
     }
     if "" in courses.values():
         return ""
-    there = [name for name, course in courses.items() if course == COURSES["rises_then_falls"]]
+    there = [name for name, course in courses.items() if course == say(COURSES["rises_then_falls"])]
     others = [name for name in courses if name not in there]
-    where = say(" at {there}", there=joined(there)) if others else say(" in every direction")
-    but = say(", not at {others}", others=joined(others)) if there and others else ""
     if not there:
         return say("no force at the mesh frequency rises, then falls over the speeds")
-    return say("the force at the mesh frequency rises, then falls over the speeds{where}{but}", where=where, but=but)
+    if not others:
+        return say("the force at the mesh frequency rises, then falls over the speeds in every direction")
+    return say(
+        "the force at the mesh frequency rises, then falls over the speeds at {forces}, not at {others}",
+        forces=joined(there),
+        others=joined(others),
+    )
+
+
+def _force_word(gear: str, direction: str) -> str:
+    return say("{gear} {direction}", gear=gear_word(gear), direction=direction)
 
 
 def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[str, str]:
@@ -155,16 +176,16 @@ def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[s
     values = values[places]
     listed = ", ".join(newtons(value) for value in values)
     if mesh.size < FEWEST:
-        return "", say("{listed}: at least {fewest} speeds are needed", listed=listed, fewest=FEWEST)
+        return "", say("{forces}: at least {fewest} speeds are needed", forces=listed, fewest=FEWEST)
     with np.errstate(divide="ignore"):
         shape = shape_of(20.0 * np.log10(values), FLAT_DB)
     start, top, end = (
-        say("{newtons} at {hertz}", newtons=newtons(values[at]), hertz=hertz(mesh[at]))
+        say("{force} at {frequency}", force=newtons(values[at]), frequency=hertz(mesh[at]))
         for at in (0, int(values.argmax()), -1)
     )
     figures = {
         "rises_then_falls": say("from {start} up to {top}, then down to {end}", start=start, top=top, end=end),
-        None: say("{listed}; largest {top}", listed=listed, top=top),
+        None: say("{forces}; largest {top}", forces=listed, top=top),
     }
     return say(COURSES[shape]), figures.get(shape, say("from {start} to {end}", start=start, end=end))
 
@@ -174,7 +195,7 @@ def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
     for gear, name in enumerate(GEARS):
         for number, direction in enumerate(DIRECTIONS):
             course, figures = _course(loaded, first[gear, number])
-            rows.append([name, direction, course, figures])
+            rows.append([gear_word(name), direction, course, figures])
     columns = (
         Column("gear", say("Gear")),
         Column("direction", say("Direction")),
@@ -182,14 +203,14 @@ def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
         Column("figures", say("Figures, conditions by rising mesh frequency")),
     )
     caption = say(
-        "How the forces at the mesh frequency go with speed; {flat_db:g} dB up or down count as level", flat_db=FLAT_DB
+        "How the forces at the mesh frequency go with speed; {change:g} dB up or down count as level", change=FLAT_DB
     )
     return Table("force-courses", caption, columns, rows, origin="calculated")
 
 
 def _table(loaded: Sequence[GearState], values: NDArray[np.float64], name: str, caption: str) -> Table:
     forces = [
-        Column(f"{gear}_{direction}_n", f"{gear.capitalize()} {direction}", "N", 1, "number")
+        Column(f"{gear}_{direction}_n", sentence(_force_word(gear, direction)).rstrip("."), "N", 1, "number")
         for gear in GEARS
         for direction in DIRECTIONS
     ]

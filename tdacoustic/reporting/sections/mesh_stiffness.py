@@ -34,7 +34,7 @@ def mesh_stiffness(result: FleetPrediction) -> Section:
         Axis(say("Mesh stiffness"), "N/µm"),
         [
             Line(time, mean * relative, "k_m(t)"),
-            Line(time[[0, -1]], np.array([mean, mean]), "mean", style="dashed", color=7),
+            Line(time[[0, -1]], np.array([mean, mean]), say("mean"), style="dashed", color=7),
         ],
         height=340,
     )
@@ -59,10 +59,10 @@ def _ripple(result: FleetPrediction) -> Paragraph:
     harmonics = [f"{significant(value, 2)} % (x{n})" for n, value in enumerate(amplitudes, 1)]
     return Paragraph(
         say(
-            "It varies by {significant} % of its mean peak to peak. Amplitudes of the mesh "
+            "It varies by {percent} % of its mean peak to peak. Amplitudes of the mesh "
             "harmonics, of the mean: {harmonics}. With the transmission error this is what excites "
             "the vibration; the closer a contact ratio is to a whole number, the less of it there is.",
-            significant=significant(100.0 * float(np.ptp(values)), 3),
+            percent=significant(100.0 * float(np.ptp(values)), 3),
             harmonics=joined(harmonics),
         )
     )
