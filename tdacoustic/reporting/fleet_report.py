@@ -5,7 +5,7 @@ from __future__ import annotations
 from tdacoustic import __version__
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.reporting.document import Document, Fact, Notice
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER
 from tdacoustic.reporting.sections.campaigns_answer import campaigns_answer
 from tdacoustic.reporting.sections.campaigns_dominance import campaigns_dominance
@@ -14,6 +14,7 @@ from tdacoustic.reporting.sections.campaigns_list import campaigns_list, campaig
 from tdacoustic.reporting.sections.campaigns_outliers import campaigns_outliers
 from tdacoustic.reporting.sections.campaigns_parameters import campaigns_parameters
 from tdacoustic.reporting.sections.campaigns_quality import campaigns_quality
+from tdacoustic.reporting.sections.campaigns_rows import years_words
 
 __all__ = ["fleet_report"]
 
@@ -28,23 +29,9 @@ def fleet_report(gathering: Gathering) -> Document:
     """
     origins = gathering.origins
     notices = []
-    made = len(gathering.of_origin("synthetic"))
+    made, held = len(gathering.of_origin("synthetic")), len(gathering.results)
     if made:
-        held = len(gathering.results)
-        which = (
-            say("Every campaign here") if made == held else say("{made} of {held} campaigns here", made=made, held=held)
-        )
-        text = say(
-            "{which} {value} made by a program; nothing in ",
-            which=which,
-            value="was" if made == 1 or made == held else "were",
-        )
-        notices.append(
-            Notice(
-                "synthetic",
-                say("{text}{value} was measured.", text=text, value="it" if made == 1 or made == held else "them"),
-            )
-        )
+        notices.append(Notice("synthetic", _made_words(made, held)))
     found = [
         campaigns_dominance(gathering),
         campaigns_levels(gathering),
@@ -62,24 +49,29 @@ def fleet_report(gathering: Gathering) -> Document:
         notices=notices,
         sections=[section for section in found if section is not None],
         facts=_facts(gathering),
-        footer=[say("Made with tdacoustic {version}.", version=__version__), *MEASURED_FOOTER],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), *(say(text) for text in MEASURED_FOOTER)],
+    )
+
+
+def _made_words(made: int, held: int) -> str:
+    """How many campaigns a program made, at least one."""
+    if made == held:
+        return say("Every campaign here was made by a program; nothing in it was measured.")
+    return say_count(
+        "{count} of {held} campaigns here was made by a program; nothing in it was measured.",
+        "{count} of {held} campaigns here were made by a program; nothing in them was measured.",
+        made,
+        held=held,
     )
 
 
 def _facts(gathering: Gathering) -> list[Fact]:
     trains = {result.identity.train for result in gathering.results if result.identity.train}
-    years = sorted({result.identity.year for result in gathering.results if result.identity.year is not None})
-    span = (
-        say("not known")
-        if not years
-        else str(years[0])
-        if len(years) == 1
-        else say("{years} to {years_2}", years=years[0], years_2=years[-1])
-    )
+    years = {result.identity.year for result in gathering.results if result.identity.year is not None}
     counts = [Fact(say("Campaigns"), str(len(gathering.of_origin(origin))), origin) for origin in gathering.origins]
     return [
         *counts,
         Fact(say("Trains"), str(len(trains)) if trains else say("not known")),
-        Fact(say("Years"), span),
+        Fact(say("Years"), years_words(years) or say("not known")),
         Fact(say("Left out"), str(len(gathering.left_out))),
     ]

@@ -7,7 +7,7 @@ from typing import Final
 from tdacoustic.reporting.document import Cell, Column, Link
 from tdacoustic.reporting.language import mark, say
 
-__all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "ORIGIN_WORDS", "cell_text", "number_text"]
+__all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "ORIGIN_WORDS", "cell_text", "number_text", "range_text"]
 
 NOTICE_WORDS: Final = {
     "info": mark("Note"),
@@ -42,6 +42,8 @@ _CHIP_WORDS: Final = ORIGIN_WORDS | {
     "motor": mark("motor"),
     "gearbox": mark("gearbox"),
     "undecided": mark("undecided"),
+    "torque": mark("torque"),
+    "speed": mark("speed"),
 }
 """Words of the tables that stand in a tag; files have them in English."""
 
@@ -64,6 +66,17 @@ def number_text(value: float, digits: int | None) -> str:
     if text.startswith("-") and not text.strip("-0."):
         text = text[1:]
     return text.replace("-", "\u2212")
+
+
+def range_text(low: str, high: str) -> str:
+    """Return a range between two numbers that are written already, without or with their unit.
+
+    Examples
+    --------
+    >>> range_text("300", "1500 rpm")
+    '300 to 1500 rpm'
+    """
+    return say("{low} to {high}", low=low, high=high)
 
 
 def cell_text(column: Column, cell: Cell) -> str:

@@ -58,6 +58,13 @@ def test_the_report_is_the_company_s(followed):
     assert '<section id="tones"' not in page and "Left out by the template of this report: Is it tonal?" in page
 
 
+def test_the_report_speaks_the_language_of_its_translations(followed):
+    page = (followed / "result" / "report.html").read_text(encoding="utf-8")
+    assert '<html lang="de">' in page
+    for english, german in (("Summary", "Zusammenfassung"), ("Contents", "Inhalt"), ("Figure 1.", "Bild 1.")):
+        assert f">{german}" in page and f">{english}" not in page
+
+
 def test_the_section_is_in_the_page(followed):
     page = (followed / "with-our-section.html").read_text(encoding="utf-8")
     assert 'id="our-limit"' in page and "Our own limit" in page

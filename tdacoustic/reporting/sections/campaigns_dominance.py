@@ -13,7 +13,14 @@ from tdacoustic.gathering.verdicts import Matrix, Row, Tally, has_verdict, talli
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.language import mark, say, say_count
-from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, SHOWN_ROWS, campaigns_words, captioned, name_cell, shown_of
+from tdacoustic.reporting.sections.campaigns_rows import (
+    MOST_ROWS,
+    SHOWN_ROWS,
+    campaigns_words,
+    captioned,
+    name_cell,
+    shown_of,
+)
 from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, probability_words, source_word
 from tdacoustic.reporting.shown import ORIGIN_WORDS
 

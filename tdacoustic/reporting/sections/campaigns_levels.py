@@ -15,17 +15,19 @@ from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.speed_bands import SpeedBand, band_at, band_width
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Band, Figure, Line, Markers, Symbol
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.campaigns_rows import (
     MOST_POINTS,
     MOST_ROWS,
+    SHOWN_ROWS,
+    captioned,
     name_cell,
-    plural,
     short,
     shown_of,
     spread_out,
     when,
 )
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["campaigns_levels"]
 
@@ -42,7 +44,14 @@ _EXPLAINED: Final = mark(
     "campaign states instead of recording them are drawn as crosses. A level of a result without distances of its "
     "microphones is not here."
 )
-_LEVEL: Final = Axis("Level at 4 m", "dB", reference="20 µPa")
+_SHOWN: Final = mark("Shown are {shown} of {held} recorded values; all are in dataset/{table}.parquet.")
+_LEVEL_FROM: Final = {"recorded": mark("recorded"), "stated": mark("stated")}
+_CORRECTIONS: Final = {
+    "none": mark("none"),
+    "applied": mark("applied"),
+    "marginal": mark("marginal"),
+    "impossible": mark("impossible"),
+}
 
 
 def campaigns_levels(gathering: Gathering) -> Section | None:
@@ -73,33 +82,46 @@ def _over_speed(origin: Origin, points: Sequence[LevelPoint]) -> FigureBlock:
         elements += _line(name, band_medians(held, BAND_KM_H if few else _width(points)), slot, not few)
     if stated:
         elements.append(_values(spread_out(stated), say("stated levels"), "x"))
-    words = say(
-        "{plural} of {plural_2}.",
-        plural=plural(len(points), "value"),
-        plural_2=plural(len(trains), say("train or campaign"), say("trains or campaigns")),
-    )
-    if groups:
-        words += say(" Lines are medians") + (
-            say(" in bands of {band_km_h:g} km/h.", band_km_h=BAND_KM_H) if few else f"{_band_words(points)}."
+    words = [_values_words(len(points), len(trains))]
+    if groups and few:
+        words.append(say("Lines are medians in bands of {width:g} km/h.", width=BAND_KM_H))
+    elif groups:
+        words.append(
+            say(
+                "Lines are medians of a fleet in bands of {width:g} km/h, with the range that 80 % of the values of a "
+                "band lie in.",
+                width=_width(points),
+            )
         )
     left = len(groups) - MOST_LINES
     if not few and left > 0:
-        words += say(
-            " {plural} with fewer values {value} no line.",
-            plural=plural(left, "fleet"),
-            value="has" if left == 1 else "have",
+        words.append(
+            say_count(
+                "{count} fleet with fewer values has no line.", "{count} fleets with fewer values have no line.", left
+            )
         )
-    left_out = shown_of(len(shown), len(recorded), say("recorded values"), "overview") if single else ""
+    if single and len(shown) < len(recorded):
+        words.append(shown_of(len(shown), len(recorded), _SHOWN, "overview"))
     figure = Figure(
         f"levels-over-speed-{origin}",
-        say("Level at 4 m over speed, {origin}", origin=origin),
-        f"{words}{left_out}",
+        say("Level at 4 m over speed, {origin}", origin=say(ORIGIN_WORDS[origin])),
+        " ".join(words),
         Axis(say("Train speed"), "km/h"),
-        _LEVEL,
+        _level_axis(),
         elements,
         height=440,
     )
     return FigureBlock(figure, origin)
+
+
+def _values_words(values: int, trains: int) -> str:
+    """How many values of how many trains a figure has."""
+    whose = say_count("{count} train or campaign", "{count} trains or campaigns", trains)
+    return say_count("{count} value of {trains}.", "{count} values of {trains}.", values, trains=whose)
+
+
+def _level_axis() -> Axis:
+    return Axis(say("Level at 4 m"), "dB", reference="20 µPa")
 
 
 def _train(point: LevelPoint) -> tuple[str, str]:
@@ -111,20 +133,13 @@ def _trains(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
     found = grouped(points, _train)
     names = [train for train, _ in found]
     return [
-        (train if names.count(train) == 1 else f"{train}, {fleet or 'no fleet'}", held)
+        (train if names.count(train) == 1 else f"{train}, {fleet or say('no fleet')}", held)
         for (train, fleet), held in found.items()
     ]
 
 
 def _width(points: Sequence[LevelPoint]) -> float:
     return band_width((point.speed_km_h for point in points), 20)
-
-
-def _band_words(points: Sequence[LevelPoint]) -> str:
-    return say(
-        " of a fleet in bands of {width:g} km/h, with the range that 80 % of the values of a band lie in",
-        width=_width(points),
-    )
 
 
 def _fleets(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
@@ -164,7 +179,7 @@ def _values(points: Sequence[LevelPoint], name: str, symbol: Symbol) -> Markers:
 def _hover(point: LevelPoint) -> str:
     parts = (
         short(point.result.train, 40),
-        say("condition {short}", short=short(point.row.condition, 24)),
+        say("condition {condition}", condition=short(point.row.condition, 24)),
         when(point.result),
     )
     return ", ".join(part for part in parts if part)
@@ -177,14 +192,7 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
     dated = [point for point in points if point.year is not None and point.row.level_from == "recorded"]
     years = {point.result.identity.year for point in dated}
     if len(years) < 2:
-        known = (
-            say("recorded levels are known of {next} alone", next=next(iter(years)))
-            if years
-            else say("no year is known of recorded ones")
-        )
-        return [
-            Paragraph(say("Levels over years, {origin}: {known}, so there is no figure.", origin=origin, known=known))
-        ]
+        return [Paragraph(_no_years(origin, years))]
     groups = grouped(dated, lambda point: (point.result.fleet, band_at(point.speed_km_h, BAND_KM_H)))
     usable = {key: held for key, held in groups.items() if len({p.result.identity.year for p in held}) > 1}
     if not usable:
@@ -192,13 +200,12 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
             Paragraph(
                 say(
                     "Levels over years, {origin}: no speed was measured in two years, so there is no figure.",
-                    origin=origin,
+                    origin=say(ORIGIN_WORDS[origin]),
                 )
             )
         ]
     several = len({fleet for fleet, _ in usable}) > 1
     largest = _chosen(usable)
-    at = say(" at {words} km/h", words=largest[0][1].words) if several else ""
     elements: list[Markers | Line] = []
     for slot, (fleet, band) in enumerate(sorted(largest)):
         held = usable[fleet, band]
@@ -217,31 +224,54 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
         medians = year_medians(held)
         times, levels = (np.array(values) for values in zip(*medians, strict=True))
         elements.append(Line(times, levels, say("{name}, median", name=name), color=slot))
-    words = say(
-        "Single conditions where their day is known at that day, else in the middle of their year; lines are medians "
-    )
-    words += say("of a year. A level may change with the track, the load and the place as well as with the train.")
+    words = [
+        say(
+            "Single conditions where their day is known at that day, else in the middle of their year; lines are "
+            "medians of a year. A level may change with the track, the load and the place as well as with the train."
+        )
+    ]
     rest = len(usable) - len(largest)
     if rest:
-        words += say(
-            " {plural} of a fleet {value} measured in several years.",
-            plural=plural(rest, say("more speed")),
-            value="was" if rest == 1 else "were",
+        words.append(
+            say_count(
+                "{count} more speed of a fleet was measured in several years.",
+                "{count} more speeds of a fleet were measured in several years.",
+                rest,
+            )
         )
     return [
         FigureBlock(
             Figure(
                 f"levels-over-years-{origin}",
-                say("Level at 4 m over the years{at}, {origin}", at=at, origin=origin),
-                words,
+                _years_title(origin, largest[0][1] if several else None),
+                " ".join(words),
                 Axis(say("Year")),
-                _LEVEL,
+                _level_axis(),
                 elements,
                 height=400,
             ),
             origin,
         )
     ]
+
+
+def _no_years(origin: Origin, years: set[int | None]) -> str:
+    """Why there is no figure over years where levels are of one year, or of none that is known."""
+    words = say(ORIGIN_WORDS[origin])
+    if years:
+        return say(
+            "Levels over years, {origin}: recorded levels are known of {year} alone, so there is no figure.",
+            origin=words,
+            year=next(iter(years)),
+        )
+    return say("Levels over years, {origin}: no year is known of recorded ones, so there is no figure.", origin=words)
+
+
+def _years_title(origin: Origin, band: SpeedBand | None) -> str:
+    words = say(ORIGIN_WORDS[origin])
+    if band is None:
+        return say("Level at 4 m over the years, {origin}", origin=words)
+    return say("Level at 4 m over the years at {speeds} km/h, {origin}", speeds=band.words, origin=words)
 
 
 def _chosen(usable: dict[tuple[str, SpeedBand], list[LevelPoint]]) -> list[tuple[str, SpeedBand]]:
@@ -283,16 +313,18 @@ def _table(gathering: Gathering, origin: Origin, points: Sequence[LevelPoint]) -
             statistics.median(point.level_db for point in levels[band]) if band in levels else None for band in bands
         ]
         results = list({id(point.result): point.result for point in held}.values())
-        corrections = sorted({point.row.correction for point in held})
+        corrections = [say(_CORRECTIONS.get(word, word)) for word in sorted({point.row.correction for point in held})]
         years = sorted({result.identity.year for result in results if result.identity.year is not None})
         span = "" if not years else str(years[0]) if len(years) == 1 else f"{years[0]}–{years[-1]}"
-        whose: list[Cell] = [name_cell(gathering, results), fleet or None, *([level_from] if stated else [])]
+        whose: list[Cell] = [
+            name_cell(gathering, results),
+            fleet or None,
+            *([say(_LEVEL_FROM.get(level_from, level_from))] if stated else []),
+        ]
         rows.append([*whose, span or None, len(held), *medians, *([", ".join(corrections)] if corrected else [])])
-    left_out = shown_of(len(rows), len(trains), "rows", "overview")
-    caption = say(
-        "Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians.{left_out}", origin=origin, left_out=left_out
-    )
-    return Table(f"levels-{origin}", caption.rstrip("."), columns, rows, origin=origin)
+    left_out = shown_of(len(rows), len(trains), SHOWN_ROWS, "overview")
+    caption = say("Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians", origin=say(ORIGIN_WORDS[origin]))
+    return Table(f"levels-{origin}", captioned(caption, left_out), columns, rows, origin=origin)
 
 
 def _whose(point: LevelPoint) -> tuple[str, bool, str, str]:

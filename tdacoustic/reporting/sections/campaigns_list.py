@@ -7,13 +7,15 @@ from typing import Final
 from tdacoustic.gathering.gathered import Gathering
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Table
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, when
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, captioned, name_cell, when
 
 __all__ = ["campaigns_list", "campaigns_sources"]
 
 MOST_CAMPAIGNS: Final = 300
 MOST_LEFT_OUT: Final = 100
+
+_SHOWN: Final = mark("Shown are {shown} of {held}; all are in results.csv and in dataset/results.parquet.")
 
 
 def campaigns_list(gathering: Gathering) -> Section:
@@ -44,13 +46,8 @@ def campaigns_list(gathering: Gathering) -> Section:
         n: list[Cell] = [result.runs, result.runs_bad, counts.get(id(result), 0)]
         rows.append([*whose, result.origin, result.fleet or None, result.n_conditions, *level, *n])
     held = len(ordered)
-    caption = say("Campaigns, those with values that stand out or bad runs first, then the newest")
-    if len(rows) < held:
-        caption += say(
-            ". Shown are {n_rows} of {held}; all are in results.csv and in dataset/results.parquet",
-            n_rows=len(rows),
-            held=held,
-        )
+    shown = "" if len(rows) == held else say(_SHOWN, shown=len(rows), held=held)
+    caption = captioned(say("Campaigns, those with values that stand out or bad runs first, then the newest"), shown)
     return Section("campaigns", say("Campaigns"), [Table("campaigns", caption, columns, rows)])
 
 
@@ -58,11 +55,9 @@ def campaigns_sources(gathering: Gathering) -> Section:
     """Return the section on where the numbers come from: the dataset, and what was left out of it."""
     words = say(
         "The dataset has a file a table; each row begins with its result, campaign, train, date, year, origin and "
+        "fleet. Units and references of levels are in the metadata of the columns."
     )
-    words += say("fleet. Units and references of levels are in the metadata of the columns.")
-    tables: list[list[Cell]] = [
-        [name, say("dataset/{name}.parquet", name=name), rows] for name, rows in gathering.rows.items()
-    ]
+    tables: list[list[Cell]] = [[name, f"dataset/{name}.parquet", rows] for name, rows in gathering.rows.items()]
     columns = [
         Column("table", say("Table")),
         Column("file", say("File")),
@@ -74,13 +69,14 @@ def campaigns_sources(gathering: Gathering) -> Section:
     of_logs = sum(each.date_from == "log" for each in dated)
     blocks.append(
         Paragraph(
-            say(
-                "The train is known of {known} of {plural}, from their [meta]; the year of "
-                "{n_dated}, of {of_logs} of them from the start that a log states. What is not "
-                "stated is empty.",
+            say_count(
+                "The train is known of {known} of {count} campaign, from their [meta]; the year of {dated}, of "
+                "{of_logs} of them from the start that a log states. What is not stated is empty.",
+                "The train is known of {known} of {count} campaigns, from their [meta]; the year of {dated}, of "
+                "{of_logs} of them from the start that a log states. What is not stated is empty.",
+                len(gathering.results),
                 known=known,
-                plural=plural(len(gathering.results), "campaign"),
-                n_dated=len(dated),
+                dated=len(dated),
                 of_logs=of_logs,
             )
         )
@@ -97,7 +93,7 @@ def _notes(gathering: Gathering, notes: list[tuple[GatheredResult, str]]) -> Det
     columns = [Column("train", say("Train, else campaign")), Column("note", say("Not used"))]
     rows = [[name_cell(gathering, [result]), note] for result, note in notes[:MOST_ROWS]]
     return Details(
-        say("Dates that could not be read: {n_notes}", n_notes=len(notes)),
+        say("Dates that could not be read: {count}", count=len(notes)),
         [Table("dates", say("Dates"), columns, rows)],
     )
 
@@ -106,9 +102,9 @@ def _left_out(gathering: Gathering) -> Table:
     columns = [Column("folder", say("Folder")), Column("reason", say("Why"))]
     rows = [[each.folder, each.reason] for each in gathering.left_out[:MOST_LEFT_OUT]]
     held = len(gathering.left_out)
-    more = (
+    shown = (
         ""
         if len(rows) == held
-        else say(". Shown are {n_rows} of {held}; manifest.json names more", n_rows=len(rows), held=held)
+        else say("Shown are {shown} of {held}; manifest.json names more.", shown=len(rows), held=held)
     )
-    return Table("left-out", say("Folders that are left out{more}", more=more), columns, rows)
+    return Table("left-out", captioned(say("Folders that are left out"), shown), columns, rows)

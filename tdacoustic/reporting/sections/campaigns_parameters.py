@@ -15,16 +15,18 @@ from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.gathering.robust import spread_of
 from tdacoustic.reporting.document import Block, Cell, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line, Markers, Rule, Symbol
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.campaigns_rows import (
     MOST_ROWS,
+    SHOWN_ROWS,
+    captioned,
     name_cell,
-    plural,
     short,
     shown_of,
     spread_out,
     when,
 )
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["campaigns_parameters"]
 
@@ -35,11 +37,19 @@ MOST_IN_ORDER: Final = 1000
 _WIDE: Final = 30.0
 
 _LOOKS: Final[tuple[tuple[State, str, int, Symbol], ...]] = (
-    ("determined", "determined, with its interval of 95 %", 0, "circle"),
-    ("on a bound", "on a bound: the optimum may lie beyond it", 1, "x"),
-    ("undetermined", "not determined by the data", 7, "triangle"),
+    ("determined", mark("determined, with its interval of 95 %"), 0, "circle"),
+    ("on a bound", mark("on a bound: the optimum may lie beyond it"), 1, "x"),
+    ("undetermined", mark("not determined by the data"), 7, "triangle"),
 )
 _STATES: Final = tuple(state for state, *_ in _LOOKS)
+_STATE_WORDS: Final[dict[State, str]] = {
+    "determined": mark("determined"),
+    "on a bound": mark("on a bound"),
+    "undetermined": mark("undetermined"),
+}
+
+_SHOWN_VALUES: Final = mark("Shown are {shown} of {held} values; all are in dataset/{table}.parquet.")
+_SHOWN_EVENLY: Final = mark("Shown are {shown} of {held} campaigns, evenly; all are in dataset/{table}.parquet.")
 
 _EXPLAINED: Final = mark(
     "Each campaign's own calibration, with the interval of 95 % where the data give one; an interval that is open to "
@@ -70,9 +80,10 @@ def campaigns_parameters(gathering: Gathering) -> Section | None:
     if left:
         blocks.append(
             Paragraph(
-                say(
-                    "{plural} of a fleet and origin: see dataset/parameters.parquet.",
-                    plural=plural(left, say("more parameter")),
+                say_count(
+                    "{count} more parameter of a fleet and origin: see dataset/parameters.parquet.",
+                    "{count} more parameters of a fleet and origin: see dataset/parameters.parquet.",
+                    left,
                 )
             )
         )
@@ -100,10 +111,8 @@ def _summary(ranked: Sequence[Group], groups: Groups) -> Table:
         middle = [None, None] if spread is None else [spread.median, spread.scatter if spread.n > 1 else None]
         counts: list[Cell] = [len(groups[group]), *(states[state] for state in _STATES)]
         rows.append([group.what, group.origin, group.fleet or None, *counts, *middle])
-    left_out = shown_of(len(rows), len(ranked), "rows", "parameters")
-    return Table(
-        "parameters", say("Calibrated parameters by fleet.{left_out}", left_out=left_out).rstrip("."), columns, rows
-    )
+    left_out = shown_of(len(rows), len(ranked), SHOWN_ROWS, "parameters")
+    return Table("parameters", captioned(say("Calibrated parameters by fleet"), left_out), columns, rows)
 
 
 # ---------------------------------------------------------------- figures
@@ -122,8 +131,8 @@ def _figure(number: int, group: Group, entries: Sequence[Entry]) -> FigureBlock:
     ordered = sorted(entries, key=lambda entry: (entry[1].value or 0.0, entry[0].train))
     values = [v.value for _, v in entries if v.state == "determined" and v.value is not None]
     median = spread_of(values, 0.0).median if values else None
-    what = f"{group.what}, {group.origin}"
-    words = f"{group.fleet}. " if group.fleet else ""
+    what = f"{group.what}, {say(ORIGIN_WORDS[group.origin])}"
+    words = f"{group.fleet}." if group.fleet else ""
     axis = Axis(group.what, scale="log" if _is_wide(entries) else "linear")
     make = _forest if len(ordered) <= MOST_NAMED else _in_order
     figure = make(f"parameter-{number}", what, words, axis, ordered, median)
@@ -147,18 +156,17 @@ def _forest(name: str, what: str, words: str, key: Axis, ordered: Sequence[Entry
         if across:
             x = np.array([value for _, ends in across for value in (*ends, ends[1])])
             y = np.array([value for place, _ in across for value in (place, place, np.nan)], dtype=np.float64)
-            elements.append(Line(x, y, legend, color=slot, group=say("interval of 95 %"), width=2.0, opacity=0.55))
+            elements.append(Line(x, y, say(legend), color=slot, group=say("interval of 95 %"), width=2.0, opacity=0.55))
         if held:
             at = np.array([places[id(result)] for result, _ in held], dtype=np.float64)
             shown = np.array([fitted.value for _, fitted in held], dtype=np.float64)
             texts = [_hover(result, fitted) for result, fitted in held]
-            elements.append(Markers(shown, at, legend, texts=texts, symbol=symbol, color=slot))
+            elements.append(Markers(shown, at, say(legend), texts=texts, symbol=symbol, color=slot))
     if median is not None:
-        elements.append(Rule(median, "median"))
+        elements.append(Rule(median, say("median")))
     names = [short(f"{result.train} {when(result)[:4]}".strip()) for result, _ in reversed(ordered)]
-    caption = say(
-        "{words}A row a campaign, by value; the dashed line is the median of the determined ones.", words=words
-    )
+    told = say("A row a campaign, by value; the dashed line is the median of the determined ones.")
+    caption = " ".join(part for part in (words, told) if part)
     height = min(150 + 22 * len(ordered), 1600)
     axis = Axis(say("Campaign"), names=names, limits=(-0.7, len(ordered) - 0.3))
     return Figure(name, say("Calibrated {what}", what=what), caption, key, axis, elements, height=height)
@@ -177,26 +185,30 @@ def _in_order(name: str, what: str, words: str, key: Axis, ordered: Sequence[Ent
         if upright:
             x = np.array([float(value) for place, _ in upright for value in (place, place, place)])
             y = np.array([value for _, ends in upright for value in (*ends, np.nan)])
-            elements.append(Line(x, y, legend, color=slot, group=say("interval of 95 %"), width=1.0, opacity=0.45))
+            elements.append(Line(x, y, say(legend), color=slot, group=say("interval of 95 %"), width=1.0, opacity=0.45))
         if held:
             at = np.array([float(place) for place, _, _ in held])
             values = np.array([fitted.value for *_, fitted in held], dtype=np.float64)
             texts = [_hover(result, fitted) for _, result, fitted in held]
-            elements.append(Markers(at, values, legend, texts=texts, symbol=symbol, color=slot))
-    left_out = shown_of(len(shown), len(ordered), say("campaigns, evenly,"), "parameters")
+            elements.append(Markers(at, values, say(legend), texts=texts, symbol=symbol, color=slot))
+    left_out = shown_of(len(shown), len(ordered), _SHOWN_EVENLY, "parameters")
     places = Axis(say("Campaigns in order"), limits=(-1.0, float(len(shown))))
-    caption = say(
-        "{words}{plural} in the order of their values.{left_out}",
-        words=words,
-        plural=plural(len(ordered), "campaign"),
-        left_out=left_out,
+    told = say_count(
+        "{count} campaign in the order of their values.",
+        "{count} campaigns in the order of their values.",
+        len(ordered),
     )
+    caption = " ".join(part for part in (words, told, left_out) if part)
     return Figure(name, say("Calibrated {what}", what=what), caption, places, key, elements, height=420)
 
 
 def _hover(result: GatheredResult, fitted: FittedValue) -> str:
-    parts = [short(result.train, 40), when(result), fitted.state]
+    parts = [short(result.train, 40), when(result), _state(fitted)]
     return ", ".join(part for part in parts if part)
+
+
+def _state(fitted: FittedValue) -> str:
+    return say(_STATE_WORDS.get(fitted.state, fitted.state))
 
 
 # ---------------------------------------------------------------- values
@@ -220,7 +232,7 @@ def _values(gathering: Gathering, ranked: Sequence[Group], groups: Groups) -> De
     for group, (result, fitted) in entries[:MOST_ROWS]:
         whose: list[Cell] = [name_cell(gathering, [result]), when(result) or None, result.origin, result.fleet or None]
         numbers: list[Cell] = [fitted.value, *fitted.ci95]
-        rows.append([*whose, group.what, *numbers, fitted.state])
-    left_out = shown_of(len(rows), len(entries), "values", "parameters")
-    caption = say("Values, doubtful ones first.{left_out}", left_out=left_out).rstrip(".")
+        rows.append([*whose, group.what, *numbers, _state(fitted)])
+    left_out = shown_of(len(rows), len(entries), _SHOWN_VALUES, "parameters")
+    caption = captioned(say("Values, doubtful ones first"), left_out)
     return Details(say("Values of single campaigns"), [Table("parameter-values", caption, columns, rows)])

@@ -6,14 +6,23 @@ from collections.abc import Sequence
 from typing import Final
 
 from tdacoustic.gathering.gathered import Gathering
+from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.result import GatheredResult
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Table
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.campaigns_rows import MOST_ROWS, name_cell, plural, shown_of, when
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.campaigns_rows import (
+    MOST_ROWS,
+    SHOWN_CAMPAIGNS,
+    captioned,
+    name_cell,
+    shown_of,
+    when,
+)
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["bad_words", "campaigns_quality"]
 
-_NOT_A_CHECK: Final = mark("level without log")
+_NOT_A_CHECK: Final = "level without log"
 
 
 def campaigns_quality(gathering: Gathering) -> Section | None:
@@ -21,11 +30,10 @@ def campaigns_quality(gathering: Gathering) -> Section | None:
     if not any(result.runs for result in gathering.results):
         return None
     words = say(
-        "{bad} A run counts as bad where a check of it or of one of its channels is bad: then that ",
-        bad=bad_words(gathering),
+        "A run counts as bad where a check of it or of one of its channels is bad: then that channel is not used. "
+        "Limits of the checks are assumed, from practice."
     )
-    words += say("channel is not used. Limits of the checks are assumed, from practice.")
-    blocks: list[Block] = [Paragraph(words)]
+    blocks: list[Block] = [Paragraph(f"{bad_words(gathering)} {words}")]
     reasons = _reasons(gathering)
     if reasons is not None:
         blocks.append(reasons)
@@ -48,23 +56,24 @@ def bad_words(gathering: Gathering) -> str:
             for count in result.quality:
                 if count.verdict == "bad":
                     counts[count.check] = counts.get(count.check, 0) + count.runs
-        why = (
-            say(", most often for {counts}", counts=max(counts, key=lambda check: (counts[check], check)))
-            if bad and counts
-            else ""
-        )
-        said.append(
-            say(
-                "Of {plural} {bad} {value} bad{why}; {warned} more {value_2} a warning.",
-                plural=plural(runs, say("{origin} run", origin=origin)),
-                bad=bad,
-                value="is" if bad == 1 else "are",
-                why=why,
-                warned=warned,
-                value_2="has" if warned == 1 else "have",
-            )
-        )
+        often = max(counts, key=lambda check: (counts[check], check)) if bad and counts else ""
+        more = say_count("{count} more has a warning", "{count} more have a warning", warned)
+        said.append(f"{_bad_of(runs, bad, origin, often)}; {more}.")
     return " ".join(said)
+
+
+def _bad_of(runs: int, bad: int, origin: Origin, often: str) -> str:
+    """How many runs are bad, and which check says so most often; empty of none."""
+    of = say_count("{count} {origin} run", "{count} {origin} runs", runs, origin=say(ORIGIN_WORDS[origin]))
+    if not often:
+        return say_count("Of {runs} {count} is bad", "Of {runs} {count} are bad", bad, runs=of)
+    return say_count(
+        "Of {runs} {count} is bad, most often for {check}",
+        "Of {runs} {count} are bad, most often for {check}",
+        bad,
+        runs=of,
+        check=often,
+    )
 
 
 def _reasons(gathering: Gathering) -> Table | None:
@@ -113,8 +122,8 @@ def _worst(gathering: Gathering) -> Table | None:
         counts: list[Cell] = [result.runs, result.runs_bad, result.runs_warned]
         whose: list[Cell] = [name_cell(gathering, [result]), result.campaign, when(result) or None, result.origin]
         rows.append([*whose, *counts, _why(result)])
-    left_out = shown_of(len(rows), len(bad), "campaigns", "results")
-    caption = say("Campaigns with bad runs, the largest part first.{left_out}", left_out=left_out).rstrip(".")
+    left_out = shown_of(len(rows), len(bad), SHOWN_CAMPAIGNS, "results")
+    caption = captioned(say("Campaigns with bad runs, the largest part first"), left_out)
     return Table("data-worst", caption, columns, rows) if rows else None
 
 

@@ -20,6 +20,7 @@ from tdacoustic.results import FleetPrediction
 __all__ = [
     "DIRECTION_SLOTS",
     "DIRECTION_SYMBOLS",
+    "begun_large",
     "begun_small",
     "by_speed",
     "conditions_words",
@@ -103,7 +104,12 @@ def hertz(value: float) -> str:
 
 def sentence(text: str) -> str:
     """Return a text as a sentence: first letter large, a full stop."""
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!')) else '.'}"
+    return f"{begun_large(text)}{'' if text.endswith(('.', '!')) else '.'}"
+
+
+def begun_large(text: str) -> str:
+    """Return a text with its first letter large."""
+    return f"{text[:1].upper()}{text[1:]}"
 
 
 def begun_small(text: str) -> str:

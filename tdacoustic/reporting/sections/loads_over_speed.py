@@ -28,6 +28,7 @@ from tdacoustic.reporting.figure import Axis, Figure, Line
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import (
     DIRECTION_SLOTS,
+    begun_large,
     first_harmonic_n,
     gear_word,
     hertz,
@@ -147,7 +148,7 @@ def _rms(loaded: Sequence[GearState]) -> NDArray[np.float64]:
 def rise_words(loaded: Sequence[GearState]) -> str:
     """Say for which gears and directions the first mesh harmonic rises, then falls; empty of too few speeds."""
     courses = {
-        _force_word(gear, direction): _course(loaded, values)[0]
+        f"{gear_word(gear)} {direction}": _course(loaded, values)[0]
         for gear, of_gear in zip(GEARS, _over_conditions(loaded), strict=True)
         for direction, values in zip(DIRECTIONS, of_gear, strict=True)
     }
@@ -164,10 +165,6 @@ def rise_words(loaded: Sequence[GearState]) -> str:
         forces=joined(there),
         others=joined(others),
     )
-
-
-def _force_word(gear: str, direction: str) -> str:
-    return say("{gear} {direction}", gear=gear_word(gear), direction=direction)
 
 
 def _course(loaded: Sequence[GearState], values: NDArray[np.float64]) -> tuple[str, str]:
@@ -210,7 +207,7 @@ def _courses(loaded: Sequence[GearState], first: NDArray[np.float64]) -> Table:
 
 def _table(loaded: Sequence[GearState], values: NDArray[np.float64], name: str, caption: str) -> Table:
     forces = [
-        Column(f"{gear}_{direction}_n", sentence(_force_word(gear, direction)).rstrip("."), "N", 1, "number")
+        Column(f"{gear}_{direction}_n", f"{begun_large(gear_word(gear))} {direction}", "N", 1, "number")
         for gear in GEARS
         for direction in DIRECTIONS
     ]

@@ -28,13 +28,13 @@ from tdacoustic.reporting.sections.printed import (
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import FleetPrediction
 
-__all__ = ["PARAMETERS", "meshing_noise", "reading_words"]
+__all__ = ["masuda_named", "meshing_noise", "reading_words"]
 
-PARAMETERS = {
-    "masuda.constant_db": ("Masuda: constant C", "dB"),
-    "masuda.displacement": ("Masuda: what X is (displacement)", ""),
-    "masuda.weighting": ("Masuda: weighting of the level", ""),
-    "masuda.placement": ("Masuda: where its source is put", ""),
+_READING = {
+    "masuda.constant_db": (mark("Masuda: constant C"), "dB"),
+    "masuda.displacement": (mark("Masuda: what X is (displacement)"), ""),
+    "masuda.weighting": (mark("Masuda: weighting of the level"), ""),
+    "masuda.placement": (mark("Masuda: where its source is put"), ""),
 }
 """Words and unit of the formula's reading, by key of the fleet file."""
 
@@ -77,29 +77,36 @@ def meshing_noise(result: FleetPrediction) -> Section:
     return Section("meshing-noise", say("Meshing noise"), blocks)
 
 
+def masuda_named(key: str) -> tuple[str, str] | None:
+    """Return words and unit of a parameter of the formula's reading, None of another."""
+    if key not in _READING:
+        return None
+    words, unit = _READING[key]
+    return say(words), unit
+
+
 def reading_words(fleet: Fleet) -> str:
     """Say in which reading the formula is used, and how far its height can be trusted."""
-    masuda = fleet.masuda
-    constant = masuda.constant_db
-    value = pretty_signs(f"{constant.value:g}")
-    if masuda.displacement.value == "um_pp":
-        x = say("X the peak to peak of the DTE in µm")
+    constant = fleet.masuda.constant_db
+    if fleet.masuda.displacement.value == "um_pp":
+        displacement = say("X the peak to peak of the DTE in µm")
     else:
-        x = say("X the peak to peak of the DTE over the static compression F₀ / k̄")
+        displacement = say("X the peak to peak of the DTE over the static compression F₀ / k̄")
     text = say(
-        "Masuda's level is that at 1 m in {level_unit} re 20 µPa with C = {value} dB, {x}, W in kW.",
-        level_unit=level_unit(fleet),
-        value=value,
-        x=x,
+        "Masuda's level is that at 1 m in {unit} re 20 µPa with C = {constant} dB, {displacement}, W in kW.",
+        unit=level_unit(fleet),
+        constant=pretty_signs(f"{constant.value:g}"),
+        displacement=displacement,
     )
-    if _is_calibrated(fleet):
-        error = "" if constant.stderr is None else f" ± {constant.stderr:.2g} dB"
-        return say(
-            "{text} The constant is calibrated{error} ({origin}).", text=text, error=error, origin=constant.origin
+    if not _is_calibrated(fleet):
+        trust = say("The constant is not calibrated, so only differences between conditions mean something.")
+    elif constant.stderr is None:
+        trust = say("The constant is calibrated ({origin}).", origin=constant.origin)
+    else:
+        trust = say(
+            "The constant is calibrated ± {error:.2g} dB ({origin}).", error=constant.stderr, origin=constant.origin
         )
-    return say(
-        "{text} The constant is not calibrated, so only differences between conditions mean something.", text=text
-    )
+    return f"{text} {trust}"
 
 
 def _is_calibrated(fleet: Fleet) -> bool:
@@ -108,7 +115,7 @@ def _is_calibrated(fleet: Fleet) -> bool:
 
 
 def _reading(fleet: Fleet) -> Table:
-    return parameter_table("masuda-reading", say("The reading of the formula in force"), fleet, PARAMETERS.get)
+    return parameter_table("masuda-reading", say("The reading of the formula in force"), fleet, masuda_named)
 
 
 Beside = dict[str, Printed]
@@ -129,21 +136,20 @@ def _relative(state: GearState, reference: GearState) -> float | None:
 
 def _table(fleet: Fleet, states: Sequence[GearState], reference: GearState, beside: Beside) -> Table:
     unit, first = level_unit(fleet), reference.condition.name
+    relative = say("dB re condition {name}", name=first)
     columns = [
         Column("condition", say("Condition")),
         Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
         Column("power_kw", say("Power W"), "kW", 1, "number"),
         Column("dte_pp_um", say("DTE"), say("µm, peak to peak"), 2, "number"),
         Column("masuda_spl_1m_db", say("Level at 1 m"), unit, 1, "number"),
-        Column("relative_db", say("Level"), say("dB re condition {first}", first=first), 1, "number"),
+        Column("relative_db", say("Level"), relative, 1, "number"),
     ]
     printed_first = beside.get(first)
     if beside:
         columns.append(Column("printed_db", say("Table 5"), say("dB, printed"), 2, "number"))
     if printed_first is not None:
-        columns.append(
-            Column("printed_relative_db", say("Table 5"), say("dB re condition {first}", first=first), 1, "number")
-        )
+        columns.append(Column("printed_relative_db", say("Table 5"), relative, 1, "number"))
     rows: list[list[Cell]] = []
     for state in states:
         condition, row = state.condition, beside.get(state.condition.name)
@@ -178,12 +184,12 @@ def _figure(fleet: Fleet, states: Sequence[GearState], reference: GearState, bes
                 np.array([row.mesh_hz for row in rows]), levels, say("Table 5, printed"), "dashed", color=1, points=True
             )
         )
-        caption = say(
-            "Calculated, and as printed in Table 5 of {paper}, each relative to its condition {name}. {caption}",
+        beside_words = say(
+            "Calculated, and as printed in Table 5 of {paper}, each relative to its condition {name}.",
             paper=say(PAPER),
             name=name,
-            caption=caption,
         )
+        caption = f"{beside_words} {caption}"
     return Figure(
         "masuda-shape",
         say("Masuda's level over the conditions, relative to condition {name}", name=name),
@@ -200,14 +206,14 @@ def _comparison(states: Sequence[GearState], beside: Beside) -> list[Block]:
     factor = 10.0 ** ((of_figure.level_db - LEVEL_OF_TEXT_DB) / 20.0)
     notice = say(
         "Against Table 5 only the shape over the conditions can be compared; the absolute level "
-        "cannot. The paper's own two levels of condition {figure_11_condition} contradict each "
-        "other: {level_of_text_db:g} dB in section 4.3 (with X = {dte_pp_um:g} µm) and "
-        "{level_db:g} dB in Table 5, a factor of {factor:.2f} in W X. Neither the torque, the "
+        "cannot. The paper's own two levels of condition {name} contradict each "
+        "other: {level_of_text:g} dB in section 4.3 (with X = {displacement:g} µm) and "
+        "{level_of_table:g} dB in Table 5, a factor of {factor:.2f} in W X. Neither the torque, the "
         "transmission error nor the inertias, bearings and damping behind Table 5 are printed.",
-        figure_11_condition=FIGURE_11_CONDITION,
-        level_of_text_db=LEVEL_OF_TEXT_DB,
-        dte_pp_um=DTE_PP_UM,
-        level_db=of_figure.level_db,
+        name=FIGURE_11_CONDITION,
+        level_of_text=LEVEL_OF_TEXT_DB,
+        displacement=DTE_PP_UM,
+        level_of_table=of_figure.level_db,
         factor=factor,
     )
     offset = _offset_words(states, beside)
@@ -223,12 +229,12 @@ def _offset_words(states: Sequence[GearState], beside: Beside) -> str:
     rest = float(np.sqrt(np.mean((off - off.mean()) ** 2)))
     return pretty_signs(
         say(
-            "over {size} conditions the level here is {off:+.1f} dB off Table 5 on average, which "
+            "over {count} conditions the level here is {offset:+.1f} dB off Table 5 on average, which "
             "the constant would take up; in shape the two then differ by {rest:.1f} dB rms, at most "
-            "by {off_2:.1f} dB",
-            size=off.size,
-            off=off.mean(),
+            "by {most:.1f} dB",
+            count=off.size,
+            offset=off.mean(),
             rest=rest,
-            off_2=np.abs(off - off.mean()).max(),
+            most=np.abs(off - off.mean()).max(),
         )
     )

@@ -13,8 +13,8 @@ from tdacoustic.measured.order_results import Average, ChannelOrders, OrderLevel
 from tdacoustic.orders import FixedFrequency
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line, Markers
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.words import joined, pretty_unit, slug
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.words import joined, pretty_unit, slug, source_word
 from tdacoustic.units import REFERENCES, reference_label
 
 __all__ = [
@@ -41,9 +41,9 @@ OFTEN: Final = 0.15
 def shaft_words(orders: RunOrders) -> str:
     """Name of the reference shaft."""
     return (
-        say("{shaft} shaft", shaft=orders.shaft)
+        say("{shaft} shaft", shaft=source_word(orders.shaft))
         if orders.shaft
-        else say("shaft of {speed_source}", speed_source=orders.speed_source)
+        else say("shaft of {channel}", channel=orders.speed_source)
     )
 
 
@@ -58,10 +58,10 @@ def order_words(name: str, order: float) -> str:
     return name if name.startswith("order ") else say("{name} (order {order:.5g})", name=name, order=order)
 
 
-def level_axis(channel: Channel, label: str = "Level", limits: tuple[float, float] | None = None) -> Axis:
+def level_axis(channel: Channel, limits: tuple[float, float] | None = None) -> Axis:
     """Return the axis of a channel's levels."""
     reference = pretty_unit(reference_label(channel.quantity) or "") or None
-    return Axis(label, "dB", reference=reference, limits=limits)
+    return Axis(say("Level"), "dB", reference=reference, limits=limits)
 
 
 def levels_db(mean_square: NDArray[np.floating], channel: Channel) -> Array:
@@ -108,19 +108,15 @@ def cut_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrder
         elements += [*_cut(slot, item, channel, joined_up=item.order.name not in tracked)]
         elements += [tracked[item.order.name]] if item.order.name in tracked else []
     elements += _disturbed(leading, channel)
-    count = (
-        say("{n_leading} strongest orders where they stand", n_leading=len(leading))
-        if len(leading) > 1
-        else say("strongest order where it stands")
+    strongest = say_count(
+        "The strongest order where it stands 6 dB over the floor, the floor taken off.",
+        "The {count} strongest orders where they stand 6 dB over the floor, the floor taken off.",
+        len(leading),
     )
     return Figure(
         slug("order-cuts", run, held.channel),
         say("{channel}, run {run}: orders over speed", channel=held.channel, run=run),
-        say(
-            "The {count} 6 dB over the floor, the floor taken off. {bandwidth}",
-            count=count,
-            bandwidth=_bandwidth_words(leading, held),
-        ),
+        f"{strongest} {_bandwidth_words(leading, held)}",
         Axis(say("Speed of the {shaft}", shaft=shaft_words(orders)), "rpm"),
         level_axis(channel),
         elements,
@@ -148,7 +144,7 @@ def _cut(slot: int, item: OrderLevels, channel: Channel, joined_up: bool) -> lis
             "dotted",
             slot,
             opacity=0.7,
-            group="floors",
+            group=say("floors"),
         ),
     ]
 
@@ -186,17 +182,26 @@ def _bandwidth_words(leading: Sequence[OrderLevels], held: ChannelOrders) -> str
     had = sorted({float(value) for item in leading for value in item.bandwidth if math.isfinite(value)})
     asked = leading[0].requested_bandwidth
     same = all(math.isclose(value, asked, rel_tol=1e-6) for value in had)
-    words = say("Bandwidth of the cuts: {value} orders", value=" and ".join(f"{value:.3g}" for value in had)) + (
-        say(", as asked for.") if same else say(" ({asked:.3g} asked for; the run has too few turns).", asked=asked)
-    )
-    filters = dict.fromkeys(f"{item.bandwidth_hz:.3g}" for item in sorted(held.tracks, key=lambda t: t.bandwidth_hz))
-    if filters:
-        words += say(
-            " Dashed, through the dots where both agree, broken where it is not sure: "
-            "Vold-Kalman filter of 2 poles, ±{list} Hz, its orders jointly.",
-            list=joined(list(filters)).replace(", ", ", ±").replace(" and ", " and ±"),
+    bandwidths = joined([f"{value:.3g}" for value in had])
+    sentences = [
+        say("Bandwidth of the cuts: {bandwidths} orders, as asked for.", bandwidths=bandwidths)
+        if same
+        else say(
+            "Bandwidth of the cuts: {bandwidths} orders ({asked:.3g} asked for; the run has too few turns).",
+            bandwidths=bandwidths,
+            asked=asked,
         )
-    return words
+    ]
+    filters = dict.fromkeys(f"±{item.bandwidth_hz:.3g}" for item in sorted(held.tracks, key=lambda t: t.bandwidth_hz))
+    if filters:
+        sentences.append(
+            say(
+                "Dashed, through the dots where both agree, broken where it is not sure: Vold-Kalman filter of 2 "
+                "poles, {bandwidths} Hz, its orders jointly.",
+                bandwidths=joined(list(filters)),
+            )
+        )
+    return " ".join(sentences)
 
 
 # ------------------------------------------------------------ averages
@@ -215,23 +220,24 @@ def average_figure(run: str, channel: Channel, average: Average) -> Figure:
     residual = math.sqrt(average.residual_mean_square)
     synchronous = float(np.sqrt(np.mean((average.waveform - average.waveform.mean()) ** 2)))
     unit, error_words = pretty_unit(channel.si_symbol), say("± standard error")
+    shaft = source_word(average.shaft)
     return Figure(
         slug("synchronous", run, channel.name, average.shaft),
         say(
-            "{name}, run {run}: what repeats with every turn of the {shaft}",
-            name=channel.name,
+            "{channel}, run {run}: what repeats with every turn of the {shaft}",
+            channel=channel.name,
             run=run,
-            shaft=average.shaft,
+            shaft=shaft,
         ),
         say(
-            "Mean over {periods} turns, rms {synchronous:.3g} {unit}; what is left of the signal has "
-            "{residual:.3g} {unit} rms. The band is the mean's standard error.",
-            periods=average.periods,
-            synchronous=synchronous,
+            "Mean over {turns} turns, rms {mean:.3g} {unit}; what is left of the signal has {rest:.3g} {unit} rms. "
+            "The band is the mean's standard error.",
+            turns=average.periods,
+            mean=synchronous,
             unit=unit,
-            residual=residual,
+            rest=residual,
         ),
-        Axis(say("Angle of the {shaft}", shaft=average.shaft), "degrees"),
+        Axis(say("Angle of the {shaft}", shaft=shaft), say("degrees")),
         Axis(say("Mean over the turns"), unit),
         [
             Band(angle, average.waveform - average.error, average.waveform + average.error, error_words, color=0),

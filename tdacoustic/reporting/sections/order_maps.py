@@ -78,15 +78,20 @@ def frequency_figure(run: str, orders: RunOrders, channel: Channel, held: Channe
         for item in sure_resonances(held)
         if item.frequency_hz <= limit
     ]
-    words = say(
-        "Mean over classes of speed; lines {resolution:.3g} Hz apart, a cell shows its "
-        "strongest. Dotted: where orders and lines are expected, by name, whether or not they "
-        "sound",
-        resolution=found.resolution,
+    mean = say(
+        "Mean over classes of speed; lines {spacing:.3g} Hz apart, a cell shows its strongest.",
+        spacing=found.resolution,
     )
-    words += say("; dashed white lines are resonances that orders pass.") if fixed else "."
+    drawn = (
+        say(
+            "Dotted: where orders and lines are expected, by name, whether or not they sound; dashed white lines are "
+            "resonances that orders pass."
+        )
+        if fixed
+        else say("Dotted: where orders and lines are expected, by name, whether or not they sound.")
+    )
     title = say("{channel}, run {run}: level over frequency and speed", channel=held.channel, run=run)
-    heading = slug("order-map-hz", run, held.channel), title, words
+    heading = slug("order-map-hz", run, held.channel), title, f"{mean} {drawn}"
     return _map(
         heading, Axis(say("Frequency"), "Hz", limits=(0.0, limit)), orders, channel, found, (sloping, fixed, ends)
     )
@@ -111,7 +116,7 @@ def order_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrd
         Line(
             np.where(item.frequency_hz / speeds <= limit, item.frequency_hz / speeds, np.nan),
             60.0 * speeds,
-            say("resonance at {frequency_hz:.0f} Hz", frequency_hz=item.frequency_hz),
+            say("resonance at {frequency:.0f} Hz", frequency=item.frequency_hz),
             "dashed",
             6,
         )
@@ -120,12 +125,11 @@ def order_figure(run: str, orders: RunOrders, channel: Channel, held: ChannelOrd
     ]
     ends = [(order.order, 60.0 * orders.highest_hz, order.name) for order in orders.orders if order.order <= limit]
     words = say(
-        "Over the angle of the {shaft}; lines {resolution:.3g} orders apart, noise bandwidth "
-        "{noise_bandwidth:.3g} orders. What follows the speed stands upright; what is fixed in "
-        "Hz bends.",
+        "Over the angle of the {shaft}; lines {spacing:.3g} orders apart, noise bandwidth {bandwidth:.3g} orders. "
+        "What follows the speed stands upright; what is fixed in Hz bends.",
         shaft=shaft_words(orders),
-        resolution=found.resolution,
-        noise_bandwidth=found.noise_bandwidth,
+        spacing=found.resolution,
+        bandwidth=found.noise_bandwidth,
     )
     heading = (
         slug("order-map", run, held.channel),

@@ -32,7 +32,7 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
     """Which order is the strongest over which speeds."""
     leading = leading_levels(held)
     if not leading:
-        return [say("{name}: no order stands 6 dB over its floor anywhere.", name=channel.name)]
+        return [say("{channel}: no order stands 6 dB over its floor anywhere.", channel=channel.name)]
     size = max(item.speeds_hz.size for item in leading)
     whole = [item for item in leading if item.speeds_hz.size == size]  # of the reference shaft: the same classes
     usable = np.array([np.where(item.usable, item.mean_square, 0.0) for item in whole])
@@ -51,17 +51,15 @@ def leader_sentences(channel: Channel, held: ChannelOrders) -> list[str]:
         item, own = whole[leader], [(a, b) for who, a, b in spans if who == leader]
         loudest = int(np.argmax(np.where(first == leader, power[leader], 0.0)))
         level = level_db(math.sqrt(power[leader][loudest]), channel.quantity)
-        at = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4]) + (
-            say(" and elsewhere") if len(own) > 4 else ""
-        )
+        speeds = joined([_range_words(rpm[a], rpm[b]) for a, b in own][:4])
         sentences.append(
             say(
-                "{name}: {order} is the strongest order {at}, with up to {level:.1f} dB at {rpm:.0f} rpm.",
-                name=channel.name,
+                "{channel}: {order} is the strongest order {speeds}, with up to {level:.1f} dB at {speed:.0f} rpm.",
+                channel=channel.name,
                 order=order_words(item.order.name, item.order.order),
-                at=at,
+                speeds=say("{speeds} and elsewhere", speeds=speeds) if len(own) > 4 else speeds,
                 level=level,
-                rpm=rpm[loudest],
+                speed=rpm[loudest],
             )
         )
     return sentences
@@ -84,9 +82,9 @@ def _leaders(usable: NDArray[np.float64], power: NDArray[np.float64]) -> NDArray
 
 
 def _range_words(low: float, high: float) -> str:
-    return (
-        say("at {low:.0f} rpm", low=low) if low == high else say("from {low:.0f} to {high:.0f} rpm", low=low, high=high)
-    )
+    if low == high:
+        return say("at {speed:.0f} rpm", speed=low)
+    return say("from {low:.0f} to {high:.0f} rpm", low=low, high=high)
 
 
 def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list[str]:
@@ -105,52 +103,58 @@ def fixed_sentences(found: RunOrders, channels: Sequence[ChannelOrders]) -> list
                 break
         else:
             groups.append((item, [channel]))
-    sentences = []
-    for item, names in sorted(groups, key=lambda group: group[0].frequency_hz):
-        if item.kind == "resonance":
-            passing = [
-                say(
-                    "{order} at {order_2:.0f} rpm",
-                    order=order_words(order.name, order.order),
-                    order_2=60.0 * item.frequency_hz / order.order,
-                )
-                for order in found.orders
-                if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
-            ]
-            width = (
-                say(", {frequency_hz:.0f} Hz wide at most", frequency_hz=item.loss_factor * item.frequency_hz)
-                if item.loss_factor > 0
-                else ""
-            )
-            sentences.append(
-                say(
-                    "A resonance near {frequency_hz:.0f} Hz{width} raises what passes it by "
-                    "{rise_db:.0f} dB in {surest}: {passing}{value}.",
-                    frequency_hz=item.frequency_hz,
-                    width=width,
-                    rise_db=item.rise_db,
-                    surest=_surest(names),
-                    passing=joined(passing[:4]),
-                    value=say(" and others") if len(passing) > 4 else "",
-                )
-            )
-        else:
-            own = _curve_name(found, item.frequency_hz)
-            sentences.append(
-                say(
-                    "A line at {frequency_hz:.1f} Hz{own} stays where it is while the speed changes, "
-                    "in {names}: it is no order of the shaft.",
-                    frequency_hz=item.frequency_hz,
-                    own=f" ({own})" if own else "",
-                    names=joined(names),
-                )
-            )
-    return sentences
+    return [
+        _resonance_words(found, item, names) if item.kind == "resonance" else _line_words(found, item, names)
+        for item, names in sorted(groups, key=lambda group: group[0].frequency_hz)
+    ]
+
+
+def _resonance_words(found: RunOrders, item: FixedFrequency, names: Sequence[str]) -> str:
+    """A resonance, how much it raises what passes it, and which orders pass it where."""
+    passing = [
+        say(
+            "{order} at {speed:.0f} rpm",
+            order=order_words(order.name, order.order),
+            speed=60.0 * item.frequency_hz / order.order,
+        )
+        for order in found.orders
+        if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
+    ]
+    orders = joined(passing[:4])
+    told = {
+        "frequency": item.frequency_hz,
+        "rise": item.rise_db,
+        "channels": _surest(names),
+        "orders": say("{orders} and others", orders=orders) if len(passing) > 4 else orders,
+    }
+    if item.loss_factor > 0:
+        return say(
+            "A resonance near {frequency:.0f} Hz, {width:.0f} Hz wide at most raises what passes it by {rise:.0f} dB "
+            "in {channels}: {orders}.",
+            width=item.loss_factor * item.frequency_hz,
+            **told,
+        )
+    return say(
+        "A resonance near {frequency:.0f} Hz raises what passes it by {rise:.0f} dB in {channels}: {orders}.", **told
+    )
+
+
+def _line_words(found: RunOrders, item: FixedFrequency, names: Sequence[str]) -> str:
+    """A line that stays in Hz, by its name where it has one."""
+    own = _curve_name(found, item.frequency_hz)
+    at = f"{item.frequency_hz:.1f} Hz"
+    return say(
+        "A line at {frequency} stays where it is while the speed changes, in {channels}: it is no order of the shaft.",
+        frequency=f"{at} ({own})" if own else at,
+        channels=joined(names),
+    )
 
 
 def _surest(names: Sequence[str]) -> str:
     """The channel that the figures are of, and the others that show the same."""
-    return names[0] + (say(" (seen in {names} too)", names=joined(names[1:])) if len(names) > 1 else "")
+    if len(names) == 1:
+        return names[0]
+    return say("{channel} (seen in {others} too)", channel=names[0], others=joined(names[1:]))
 
 
 def _curve_name(found: RunOrders, frequency_hz: float) -> str:
@@ -176,16 +180,12 @@ def loudest_order_words(analysis: Analysis, run: MeasuredRun, microphones: Seque
         top = int(np.argmax(power))
         level = level_db(math.sqrt(float(power[top])), run.recording[held.channel].quantity)
         if level is not None and (loudest is None or level > loudest[0]):
-            name = order_words(item.order.name, item.order.order)
-            rpm = 60.0 * item.speeds_hz[top]
-            loudest = (
-                level,
-                say(
-                    "{name}, up to {level:.1f} dB at {rpm:.0f} rpm at {channel}",
-                    name=name,
-                    level=level,
-                    rpm=rpm,
-                    channel=held.channel,
-                ),
+            words = say(
+                "strongest order: {order}, up to {level:.1f} dB at {speed:.0f} rpm at {channel}",
+                order=order_words(item.order.name, item.order.order),
+                level=level,
+                speed=60.0 * item.speeds_hz[top],
+                channel=held.channel,
             )
-    return "" if loudest is None else say("strongest order: {loudest}", loudest=loudest[1])
+            loudest = (level, words)
+    return "" if loudest is None else loudest[1]

@@ -13,8 +13,8 @@ from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Figure
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.folding import chosen, in_sight
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.folding import chosen, in_sight, rows_words
 from tdacoustic.reporting.sections.order_figures import average_figure, cut_figure, shaft_words
 from tdacoustic.reporting.sections.order_maps import frequency_figure, order_figure
 from tdacoustic.reporting.sections.order_sentences import fixed_sentences, leader_sentences
@@ -58,19 +58,25 @@ def orders(analysis: Analysis) -> Section | None:
 def _method(held: Sequence[tuple[MeasuredRun, RunOrders]]) -> str:
     shafts = joined(list(dict.fromkeys(shaft_words(found) for _, found in held)))
     asked = held[0][1].requested_bandwidth
-    named = (
-        say("and named by the fleet")
+    resampled = (
+        say(
+            "Signals are resampled to even steps of the angle of the {shafts}; orders are per turn of it, and named by "
+            "the fleet.",
+            shafts=shafts,
+        )
         if any(_named(found) for _, found in held)
-        else say("and nobody names their owners")
+        else say(
+            "Signals are resampled to even steps of the angle of the {shafts}; orders are per turn of it, and nobody "
+            "names their owners.",
+            shafts=shafts,
+        )
     )
-    return say(
-        "Signals are resampled to even steps of the angle of the {shafts}; orders are per turn "
-        "of it, {named}. Cuts are {asked:.3g} orders wide; each level has its floor and standard "
-        "error, and orders.csv says why one is missing or doubtful.",
-        shafts=shafts,
-        named=named,
-        asked=asked,
+    cuts = say(
+        "Cuts are {bandwidth:.3g} orders wide; each level has its floor and standard error, and orders.csv says why "
+        "one is missing or doubtful.",
+        bandwidth=asked,
     )
+    return f"{resampled} {cuts}"
 
 
 def _named(found: RunOrders) -> bool:
@@ -118,13 +124,14 @@ def _run_up(analysis: Analysis, run: MeasuredRun, found: RunOrders, microphones:
     blocks += chosen(say("Channel"), [(name, shown) for name, shown in views if shown])
     left = len(channels) - len(drawn)
     if left > 0:
-        blocks.append(
-            Paragraph(say("Maps and orders of {left} more channels are in result.h5 and orders.csv.", left=left))
+        words = say_count(
+            "Maps and orders of {count} more channel are in result.h5 and orders.csv.",
+            "Maps and orders of {count} more channels are in result.h5 and orders.csv.",
+            left,
         )
+        blocks.append(Paragraph(words))
     blocks += _fixed_table(analysis, run)
-    return Section(
-        slug("orders-of", run.name), say("Run {name}: {speed}", name=run.name, speed=speed_words(run)), blocks
-    )
+    return Section(slug("orders-of", run.name), say("Run {run}: {speed}", run=run.name, speed=speed_words(run)), blocks)
 
 
 def _told(run: MeasuredRun) -> set[str]:
@@ -150,10 +157,9 @@ def _fixed_table(analysis: Analysis, run: MeasuredRun) -> list[Block]:
     )
     name = slug("resonances", run.name)
     caption = say(
-        "What stays at its frequency while the speed changes, run {name}. A resonance raises "
-        "orders that pass it; a line is there by itself at each class of speed. The width is an "
-        "upper bound: the sweep broadens it.",
-        name=run.name,
+        "What stays at its frequency while the speed changes, run {run}. A resonance raises orders that pass it; a "
+        "line is there by itself at each class of speed. The width is an upper bound: the sweep broadens it.",
+        run=run.name,
     )
     return [in_sight(Table(name, caption, columns, _cells(held, columns)), say("What stays at its frequency"))]
 
@@ -188,30 +194,7 @@ def _steady(analysis: Analysis, held: Sequence[tuple[MeasuredRun, RunOrders]], m
                         best = (share, run, channel, average)
     blocks: list[Block] = []
     if shares:
-        low, high = min(shares), max(shares)
-        words = (
-            say(
-                "Of the sound energy {low:.0f} % ({low_2}, run {low_3}) to {high:.0f} % ({high_2}, "
-                "run {high_3}) repeats with every turn of the {shaft}",
-                low=100.0 * low[0],
-                low_2=low[1],
-                low_3=low[2],
-                high=100.0 * high[0],
-                high_2=high[1],
-                high_3=high[2],
-                shaft=shaft_words(held[0][1]),
-            )
-            if len(shares) > 1
-            else say(
-                "Of the sound energy at {low} {low_2:.0f} % repeats with every turn of the {shaft}",
-                low=low[1],
-                low_2=100.0 * low[0],
-                shaft=shaft_words(held[0][1]),
-            )
-        )
-        blocks.append(
-            Paragraph(say("{words}: gears and what turns. The rest is what does not follow the shaft.", words=words))
-        )
+        blocks.append(Paragraph(_share_words(shares, shaft_words(held[0][1]))))
     columns = (
         Column("run", say("Run")),
         Column("channel", say("Channel")),
@@ -228,8 +211,36 @@ def _steady(analysis: Analysis, held: Sequence[tuple[MeasuredRun, RunOrders]], m
     if rows:
         table = Table("synchronous", caption, columns, rows)
         shown = [FigureBlock(average_figure(best[1].name, *best[2:]), analysis.campaign.origin)] if best else []
-        blocks.append(Details(say("{n_rows} synchronous averages", n_rows=len(rows)), [table, *shown]))
+        words = say_count("{count} synchronous average", "{count} synchronous averages", len(rows))
+        blocks.append(Details(words, [table, *shown]))
     return Section("synchronous-averages", say("What repeats with every turn, at constant speed"), blocks)
+
+
+def _share_words(shares: Sequence[tuple[float, str, str]], shaft: str) -> str:
+    """Which part of the sound repeats with every turn, at which channel in which run."""
+    low, high = min(shares), max(shares)
+    repeats = (
+        say(
+            "Of the sound energy {least:.0f} % ({channel}, run {run}) to {most:.0f} % ({other_channel}, run "
+            "{other_run}) repeats with every turn of the {shaft}: gears and what turns.",
+            least=100.0 * low[0],
+            channel=low[1],
+            run=low[2],
+            most=100.0 * high[0],
+            other_channel=high[1],
+            other_run=high[2],
+            shaft=shaft,
+        )
+        if len(shares) > 1
+        else say(
+            "Of the sound energy at {channel} {share:.0f} % repeats with every turn of the {shaft}: gears and what "
+            "turns.",
+            channel=low[1],
+            share=100.0 * low[0],
+            shaft=shaft,
+        )
+    )
+    return f"{repeats} {say('The rest is what does not follow the shaft.')}"
 
 
 # ------------------------------------------------------------ sidebands
@@ -261,9 +272,7 @@ def _sidebands(analysis: Analysis) -> list[Block]:
     )
     rows = _cells(held, columns)
     name = say("Pairs of sidebands that stand 6 dB over the floor on both sides")
-    folded = Details(
-        say("Sidebands over speed, {n_rows} rows", n_rows=len(rows)), [Table("sidebands", name, columns, rows)]
-    )
+    folded = Details(rows_words(say("Sidebands over speed"), len(rows)), [Table("sidebands", name, columns, rows)])
     return [Paragraph(_sideband_words(held)), folded]
 
 
@@ -275,25 +284,26 @@ def _sideband_words(held: pd.DataFrame) -> str:
         steady = int((~family["reason"].fillna("").str.contains("unsteady")).sum())
         said.append(
             say(
-                "of {carrier}, spaced by the {spacing}, up to {sidebands_db:.1f} dB against the "
-                "carrier ({channel}, {speed_rpm:.0f} rpm), with steady phases in {steady} of "
-                "{n_family} findings",
+                "of {carrier}, spaced by the {spacing}, up to {level:.1f} dB against the carrier ({channel}, "
+                "{speed:.0f} rpm), with steady phases in {steady} of {findings} findings",
                 carrier=carrier,
                 spacing=spacing,
-                sidebands_db=strongest["sidebands_db"],
+                level=strongest["sidebands_db"],
                 channel=strongest["channel"],
-                speed_rpm=strongest["speed_rpm"],
+                speed=strongest["speed_rpm"],
                 steady=steady,
-                n_family=len(family),
+                findings=len(family),
             )
         )
-    faint = ""
+    sentences = [say("Sidebands stand out {families}.", families="; ".join(said))]
     if held["sidebands_db"].max() < FAINT_DB:
-        faint = say(
-            " All are more than {faint_db:.0f} dB below their carrier: too faint to matter to the sound.",
-            faint_db=-FAINT_DB,
+        sentences.append(
+            say(
+                "All are more than {distance:.0f} dB below their carrier: too faint to matter to the sound.",
+                distance=-FAINT_DB,
+            )
         )
-    return pretty_signs(say("Sidebands stand out {said}.{faint}", said="; ".join(said), faint=faint))
+    return pretty_signs(" ".join(sentences))
 
 
 def _cells(held: pd.DataFrame, columns: Sequence[Column]) -> list[list[Any]]:

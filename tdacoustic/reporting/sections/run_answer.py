@@ -6,8 +6,8 @@ import math
 
 from tdacoustic.drive import GearState
 from tdacoustic.reporting.document import Block, Notice, Section, Sentences
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.answer import conditions_answer, verdicts_answer
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.answer import conditions_answer
 from tdacoustic.reporting.sections.calibration import calibration_answer
 from tdacoustic.reporting.sections.gear_answer import asked_lines
 from tdacoustic.reporting.sections.gear_words import (
@@ -15,13 +15,16 @@ from tdacoustic.reporting.sections.gear_words import (
     conditions_words,
     hertz,
     largest_line,
+    named_conditions,
     newtons,
+    range_words,
     sentence,
     state_words,
 )
 from tdacoustic.reporting.sections.parameters import key_words, quantity_of
 from tdacoustic.reporting.sections.sound_paths import SoundPath, heard_paths, is_added
-from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.reporting.sections.verdicts import verdicts_answer
+from tdacoustic.reporting.sections.words import pretty_signs, source_word
 from tdacoustic.results import CampaignResult, FleetPrediction
 
 __all__ = ["calibration_line", "model_lines", "prediction_line", "run_answer"]
@@ -57,17 +60,17 @@ def calibration_line(result: CampaignResult) -> str:
     found = result.calibration.calibration
     values = [
         say(
-            "{key} {initial:.4g} to {quantity_of}",
-            key=key_words(p.key, found.fleet),
+            "{parameter} {initial:.4g} to {value}",
+            parameter=key_words(p.key, found.fleet),
             initial=p.initial,
-            quantity_of=quantity_of(p.key, p.value),
+            value=quantity_of(p.key, p.value),
         )
         for p in found.parameters
     ]
     errors = [(level.before_db - level.datum.level_db, level.error_db) for level in found.levels]
     before, after = (math.hypot(*side) / math.sqrt(len(errors)) for side in zip(*errors, strict=True))
     misfit = say("levels off by {before:.1f} dB rms before, {after:.1f} dB after", before=before, after=after)
-    doubts = say("{n_doubts} doubt{value}", n_doubts=len(found.doubts), value="s" if len(found.doubts) != 1 else "")
+    doubts = say_count("{count} doubt", "{count} doubts", len(found.doubts))
     return pretty_signs(
         say("Calibration: {values}; {misfit}; {doubts}.", values=", ".join(values), misfit=misfit, doubts=doubts)
     )
@@ -77,8 +80,10 @@ def prediction_line(result: CampaignResult) -> str:
     """Return the prediction in a line of text; empty without one."""
     if result.prediction is None:
         return ""
-    levels = _level_words(result.prediction)
-    return say("Prediction with {which}: {levels}.", which=_which(result), levels=levels or say("no sound"))
+    levels = _level_words(result.prediction) or say("no sound")
+    if result.calibration is None:
+        return say("Prediction with the fleet as it is: {levels}.", levels=levels)
+    return say("Prediction with the calibrated fleet: {levels}.", levels=levels)
 
 
 def model_lines(result: CampaignResult) -> list[str]:
@@ -95,18 +100,19 @@ def _dominance_line(result: CampaignResult) -> str:
     if not named:
         return ""
     parts = [
-        say("the {source} dominates the noise lines in {conditions}", source=source, conditions=_conditions(names))
+        say(
+            "the {source} dominates the noise lines in {conditions}",
+            source=source_word(source),
+            conditions=named_conditions(names),
+        )
         for source, names in named.items()
     ]
-    parts += [say("undecided in {conditions}", conditions=_conditions(undecided))] if undecided else []
+    parts += [say("undecided in {conditions}", conditions=named_conditions(undecided))] if undecided else []
     of_sound = [100.0 * v.line_fraction for v in result.analysis.dominance if v.line_fraction is not None]
-    ends = list(dict.fromkeys(f"{end:.0f}" for end in (min(of_sound), max(of_sound)))) if of_sound else []
-    parts += [say("these lines are {ends} % of the sound energy", ends=" to ".join(ends))] if ends else []
+    if of_sound:
+        percent = range_words(f"{min(of_sound):.0f}", f"{max(of_sound):.0f}")
+        parts.append(say("these lines are {percent} % of the sound energy", percent=percent))
     return sentence("; ".join(parts))
-
-
-def _conditions(names: list[str]) -> str:
-    return say("condition{value} {names}", value="s" if len(names) > 1 else "", names=joined(names))
 
 
 def _predicted_words(found: FleetPrediction) -> list[str]:
@@ -115,23 +121,19 @@ def _predicted_words(found: FleetPrediction) -> list[str]:
         (
             line[2],
             say(
-                "{newtons} at {hertz} in {state}, {line}, {line_2}",
-                newtons=newtons(line[2]),
-                hertz=hertz(line[3]),
-                state=state_words(state),
-                line=line[0],
-                line_2=line[1],
+                "{force} at {frequency} in {condition}, {gear}, {direction}",
+                force=newtons(line[2]),
+                frequency=hertz(line[3]),
+                condition=state_words(state),
+                gear=line[0],
+                direction=line[1],
             ),
         )
         for state in found.prediction.conditions
         if (line := largest_line(state)) is not None
     ]
     words = [louder] if (louder := _louder_words(found)) else []
-    return [*words, say("The largest bearing force is {forces}.", forces=max(forces)[1])] if forces else words
-
-
-def _which(result: CampaignResult) -> str:
-    return say("the fleet as it is") if result.calibration is None else say("the calibrated fleet")
+    return [*words, say("The largest bearing force is {force}.", force=max(forces)[1])] if forces else words
 
 
 def _total_db(found: FleetPrediction, state: GearState, path: str = "total") -> float | None:
@@ -143,10 +145,10 @@ def _level_words(found: FleetPrediction) -> str:
     """Levels on the surface by speed; empty where nothing sounds."""
     levels = [
         say(
-            "{level:.1f} dB in condition {name} ({train_speed_km_h:.4g} km/h)",
+            "{level:.1f} dB in condition {condition} ({speed:.4g} km/h)",
             level=level,
-            name=state.condition.name,
-            train_speed_km_h=state.condition.train_speed_km_h,
+            condition=state.condition.name,
+            speed=state.condition.train_speed_km_h,
         )
         for state in by_speed(found.prediction.conditions)
         if (level := _total_db(found, state)) is not None
@@ -156,9 +158,9 @@ def _level_words(found: FleetPrediction) -> str:
     shown = (
         ", ".join(levels)
         if len(levels) <= MOST_LEVELS
-        else say("{levels} to {levels_2}", levels=levels[0], levels_2=levels[-1])
+        else say("{lowest} to {highest}", lowest=levels[0], highest=levels[-1])
     )
-    return say("at {surface} {shown}", surface=found.prediction.surface, shown=shown)
+    return say("at {surface} {levels}", surface=found.prediction.surface, levels=shown)
 
 
 def _louder_words(found: FleetPrediction) -> str:
@@ -172,17 +174,13 @@ def _louder_words(found: FleetPrediction) -> str:
         if levels:
             held[max(levels, key=levels.__getitem__)].append(state)
     parts = [
-        say("{phrase} in {conditions}", phrase=path.phrase, conditions=conditions_words(states))
+        say("{part} in {conditions}", part=say(path.phrase), conditions=conditions_words(states))
         for path, states in held.items()
         if states
     ]
-    return sentence(
-        say(
-            "the {value} part of the total is {parts}",
-            value="louder" if len(added) == 2 else "loudest",
-            parts=", ".join(parts),
-        )
-    )
+    if len(added) == 2:
+        return say("The louder part of the total is {parts}.", parts=", ".join(parts))
+    return say("The loudest part of the total is {parts}.", parts=", ".join(parts))
 
 
 def _new_doubts(result: CampaignResult) -> list[Notice]:

@@ -11,8 +11,8 @@ from tdacoustic.drive import GearState, SpeedSweep
 from tdacoustic.gears import Branch, coexisting
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.gear_words import by_speed, hertz, law_words, sentence, significant
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.gear_words import by_speed, hertz, law_words, micrometres, sentence, significant
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import FleetPrediction
 
@@ -85,13 +85,12 @@ def _differ(sweep: SpeedSweep) -> tuple[Mask, Mask]:
 def _range_words(result: FleetPrediction, sweep: SpeedSweep) -> str:
     speeds, mesh = sweep.train_speed_km_h, sweep.up.mesh_hz
     return say(
-        "{n_speeds} speeds from {significant} to {significant_2} km/h each way (mesh {hertz} to "
-        "{hertz_2}), torque {law}.",
-        n_speeds=len(speeds),
-        significant=significant(speeds[0]),
-        significant_2=significant(speeds[-1]),
-        hertz=hertz(float(mesh[0])),
-        hertz_2=hertz(float(mesh[-1])),
+        "{count} speeds from {slowest} to {fastest} km/h each way (mesh {lowest} to {highest}), torque {law}.",
+        count=len(speeds),
+        slowest=significant(speeds[0]),
+        fastest=significant(speeds[-1]),
+        lowest=hertz(float(mesh[0])),
+        highest=hertz(float(mesh[-1])),
         law=law_words(result.fleet),
     )
 
@@ -101,13 +100,8 @@ def _findings(sweep: SpeedSweep) -> list[str]:
         return [say("without torque nothing moves at any speed")]
     up, down = sweep.up, sweep.down
     twice, open_ended = _differ(sweep)
-    found = (
-        [say("two motions are stable {places}", places=_places(sweep, twice))]
-        if twice.any()
-        else [say("the two ways end in one motion")]
-    )
+    found = [_ends_words(sweep, twice, judged=bool(open_ended.any()))]
     if open_ended.any():
-        found[0] += say(", judged where both ways repeat")
         found.append(_open_words(sweep, open_ended))
     apart = _separate(up) | _separate(down)[::-1]
     found.append(
@@ -118,27 +112,46 @@ def _findings(sweep: SpeedSweep) -> list[str]:
     several = (_repeats(up) != 1) | (_repeats(down)[::-1] != 1)
     if several.any():
         found.append(say("the motion does not repeat with each mesh period {places}", places=_places(sweep, several)))
-    best = max((up, down), key=lambda branch: float(branch.dte_pp_m.max()))
+    return [*found, _largest_words(sweep, one_motion=not (twice | open_ended).any())]
+
+
+def _ends_words(sweep: SpeedSweep, twice: Mask, judged: bool) -> str:
+    """Whether the two ways end in one motion; judged: only where both repeat."""
+    if not twice.any():
+        if judged:
+            return say("the two ways end in one motion, judged where both ways repeat")
+        return say("the two ways end in one motion")
+    places = _places(sweep, twice)
+    if judged:
+        return say("two motions are stable {places}, judged where both ways repeat", places=places)
+    return say("two motions are stable {places}", places=places)
+
+
+def _largest_words(sweep: SpeedSweep, one_motion: bool) -> str:
+    best = max((sweep.up, sweep.down), key=lambda branch: float(branch.dte_pp_m.max()))
     peak = int(best.dte_pp_m.argmax())
-    way = "" if not (twice | open_ended).any() else say(" on the way up") if best is up else say(" on the way down")
-    largest = say(
-        "{significant} µm at {hertz}",
-        significant=significant(1000000.0 * float(best.dte_pp_m[peak])),
-        hertz=hertz(float(best.mesh_hz[peak])),
-    )
-    return [*found, say("the largest DTE is {largest}{way}", largest=largest, way=way)]
+    length, frequency = micrometres(float(best.dte_pp_m[peak])), hertz(float(best.mesh_hz[peak]))
+    if one_motion:
+        return say("the largest DTE is {length} at {frequency}", length=length, frequency=frequency)
+    if best is sweep.up:
+        return say("the largest DTE is {length} at {frequency} on the way up", length=length, frequency=frequency)
+    return say("the largest DTE is {length} at {frequency} on the way down", length=length, frequency=frequency)
 
 
 def _open_words(sweep: SpeedSweep, open_ended: Mask) -> str:
     one_way = (_repeats(sweep.up) == 0) != (_repeats(sweep.down)[::-1] == 0)
-    text = say("at {counted} a motion does not repeat", counted=_counted(open_ended))
-    if one_way.any():
-        text += say(", at {counted} on one way only, where two motions may be stable too", counted=_counted(one_way))
-    return text
+    speeds = _counted(open_ended)
+    if not one_way.any():
+        return say("at {speeds} a motion does not repeat", speeds=speeds)
+    return say(
+        "at {speeds} a motion does not repeat, at {others} on one way only, where two motions may be stable too",
+        speeds=speeds,
+        others=_counted(one_way),
+    )
 
 
 def _counted(mask: Mask) -> str:
-    return say("{mask} speed{value}", mask=int(mask.sum()), value="s" if mask.sum() > 1 else "")
+    return say_count("{count} speed", "{count} speeds", int(mask.sum()))
 
 
 def _runs(mask: Mask) -> list[tuple[int, int]]:
@@ -153,12 +166,12 @@ def _places(sweep: SpeedSweep, mask: Mask) -> str:
     if len(runs) > 3:
         first, last = speeds[runs[0][0]], speeds[runs[-1][1]]
         return say(
-            "at {mask} speeds between {first:.4g} and {last:.4g} km/h", mask=int(mask.sum()), first=first, last=last
+            "at {count} speeds between {first:.4g} and {last:.4g} km/h", count=int(mask.sum()), first=first, last=last
         )
     words = [
-        say("at {speeds:.4g} km/h", speeds=speeds[start])
+        say("at {speed:.4g} km/h", speed=speeds[start])
         if start == end
-        else say("from {speeds:.4g} to {speeds_2:.4g} km/h", speeds=speeds[start], speeds_2=speeds[end])
+        else say("from {first:.4g} to {last:.4g} km/h", first=speeds[start], last=speeds[end])
         for start, end in runs
     ]
     return joined(words)
@@ -166,8 +179,8 @@ def _places(sweep: SpeedSweep, mask: Mask) -> str:
 
 def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
     elements: list[Element] = [
-        Line(sweep.up.mesh_hz, 1e6 * sweep.up.dte_pp_m, "up", color=0),
-        Line(sweep.down.mesh_hz, 1e6 * sweep.down.dte_pp_m, "down", style="dashed", color=1),
+        Line(sweep.up.mesh_hz, 1e6 * sweep.up.dte_pp_m, say("up"), color=0),
+        Line(sweep.down.mesh_hz, 1e6 * sweep.down.dte_pp_m, say("down"), style="dashed", color=1),
     ]
     twice, _ = _differ(sweep)
     if twice.any():
@@ -208,23 +221,21 @@ def _conditions(states: list[GearState]) -> Markers:
     x = np.array([state.mesh_hz for state in states])
     y = np.array([1e6 * state.steady.dte_pp_m for state in states])
     names = [state.condition.name for state in states]
-    return Markers(x, y, "conditions", labels=names, symbol="diamond", color=7)
+    return Markers(x, y, say("conditions"), labels=names, symbol="diamond", color=7)
 
 
 def _multipliers(sweep: SpeedSweep) -> Figure:
     low, high = float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1])
     elements: list[Element] = [
-        Line(sweep.up.mesh_hz, sweep.up.floquet_max, "up", color=0),
-        Line(sweep.down.mesh_hz, sweep.down.floquet_max, "down", style="dashed", color=1),
+        Line(sweep.up.mesh_hz, sweep.up.floquet_max, say("up"), color=0),
+        Line(sweep.down.mesh_hz, sweep.down.floquet_max, say("down"), style="dashed", color=1),
         Line(np.array([low, high]), np.array([1.0, 1.0]), say("limit of stability"), style="dotted", color=7),
     ]
-    for branch, name, color in ((sweep.up, "up", 0), (sweep.down, "down", 1)):
+    gaps = ((sweep.up, say("up, between gaps"), 0), (sweep.down, say("down, between gaps"), 1))
+    for branch, name, color in gaps:
         held = _alone(branch.floquet_max)
         if held.any():
-            points = Markers(
-                branch.mesh_hz[held], branch.floquet_max[held], say("{name}, between gaps", name=name), color=color
-            )
-            elements.append(points)
+            elements.append(Markers(branch.mesh_hz[held], branch.floquet_max[held], name, color=color))
     return Figure(
         "sweep-floquet",
         say("Largest Floquet multiplier over the speed sweep"),
@@ -254,8 +265,8 @@ def _contact(sweep: SpeedSweep) -> Figure:
         Axis(say("Mesh frequency"), "Hz", limits=(float(sweep.up.mesh_hz[0]), float(sweep.up.mesh_hz[-1]))),
         Axis(say("Teeth touch"), say("% of time")),
         [
-            Line(sweep.up.mesh_hz, 100.0 * sweep.up.contact_part, "up", color=0),
-            Line(sweep.down.mesh_hz, 100.0 * sweep.down.contact_part, "down", style="dashed", color=1),
+            Line(sweep.up.mesh_hz, 100.0 * sweep.up.contact_part, say("up"), color=0),
+            Line(sweep.down.mesh_hz, 100.0 * sweep.down.contact_part, say("down"), style="dashed", color=1),
         ],
         height=300,
     )
@@ -264,12 +275,12 @@ def _contact(sweep: SpeedSweep) -> Figure:
 def _stretches(sweep: SpeedSweep) -> Iterator[list[Cell]]:
     """Rows of the table: what happens from which speed to which."""
     mesh, speeds = sweep.up.mesh_hz, sweep.train_speed_km_h
-    found: list[tuple[str, str, Mask]] = [("both", say("two motions are stable"), _differ(sweep)[0])]
-    for name, branch, order in (("up", sweep.up, 1), ("down", sweep.down, -1)):
+    found: list[tuple[str, str, Mask]] = [(say("both"), say("two motions are stable"), _differ(sweep)[0])]
+    for name, branch, order in ((say("up"), sweep.up, 1), (say("down"), sweep.down, -1)):
         repeats = _repeats(branch)[::order]
         found.append((name, say("teeth separate"), _separate(branch)[::order]))
         for periods in sorted(set(repeats[repeats > 1].tolist())):
-            found.append((name, say("repeats after {periods} mesh periods", periods=periods), repeats == periods))
+            found.append((name, say("repeats after {count} mesh periods", count=periods), repeats == periods))
         found.append((name, say("does not repeat"), repeats == 0))
     for way, what, mask in found:
         for start, end in _runs(mask):

@@ -43,6 +43,12 @@ METHOD = mark(
     "backlash and the compression of the teeth under the load. Its peak to peak is taken from the whole series, not "
     "from the points drawn."
 )
+DASHED = mark(
+    "The dashed line is where the flanks that carry begin to touch: half the backlash and the transmission error of "
+    "the unloaded gears."
+)
+BETWEEN = mark("Between the dashed line and the one a backlash away from it the teeth do not touch.")
+TOGETHER = mark("δ stays beyond it, so the teeth stay in contact.")
 
 
 def transmission_error(result: FleetPrediction) -> Section:
@@ -83,21 +89,18 @@ def _over_time(result: FleetPrediction, state: GearState) -> Figure:
     if (side * (delta - 1e6 * error)).min() < 0.0:
         other = 1e6 * (error - side * system.half_backlash_m)
         lines.append(Line(ms, other, say("edge of the gap, other flanks"), style="dotted", color=7))
-    between = say("Between the dashed line and the one a backlash away from it the teeth do not touch.")
-    together = say("δ stays beyond it, so the teeth stay in contact.")
-    record = "" if state.steady.repeats_after is not None else say(" The first mesh periods of the record.")
+    caption = [
+        sentence(motion_words(state.steady)),
+        say("Peak to peak {length}.", length=micrometres(state.steady.dte_pp_m)),
+        say(DASHED),
+        say(BETWEEN) if state.steady.separates else say(TOGETHER),
+    ]
+    if state.steady.repeats_after is None:
+        caption.append(say("The first mesh periods of the record."))
     return Figure(
         "dte-over-time",
-        say("Dynamic transmission error over time, {state}", state=state_words(state)),
-        say(
-            "{sentence} Peak to peak {micrometres}. The dashed line is where the flanks that carry "
-            "begin to touch: half the backlash and the transmission error of the unloaded gears. "
-            "{between}{record}",
-            sentence=sentence(motion_words(state.steady)),
-            micrometres=micrometres(state.steady.dte_pp_m),
-            between=between if state.steady.separates else together,
-            record=record,
-        ),
+        say("Dynamic transmission error over time, {condition}", condition=state_words(state)),
+        " ".join(caption),
         Axis(say("Time"), "ms"),
         Axis(say("DTE δ"), "µm"),
         lines,
@@ -112,15 +115,13 @@ def _of_all(moving: list[GearState]) -> Figure:
         state = moving[place]
         time, delta = _waveform(state)
         lines.append(Line(time, delta - delta.mean(), state.condition.name))
-    some = (
-        ""
-        if len(places) == len(moving)
-        else say(" {n_places} of {n_moving} conditions are drawn.", n_places=len(places), n_moving=len(moving))
-    )
+    caption = [say("Each without its mean.")]
+    if len(places) < len(moving):
+        caption.append(say("{count} of {all} conditions are drawn.", count=len(places), all=len(moving)))
     return Figure(
         "dte-conditions",
         say("Dynamic transmission error of the conditions over mesh periods"),
-        say("Each without its mean.{some}", some=some),
+        " ".join(caption),
         Axis(say("Time"), say("mesh periods")),
         Axis(say("δ without its mean"), "µm"),
         lines,
@@ -134,9 +135,9 @@ def _table(states: list[GearState]) -> Table:
         Column("mesh_frequency_hz", say("Mesh"), "Hz", 1, "number"),
         Column("dte_pp_um", say("Peak to peak"), "µm", 2, "number"),
         Column("mean_um", say("Mean"), "µm", 1, "number"),
-        Column("static_compression_um", say("F₀ / k̄"), "µm", 1, "number"),
+        Column("static_compression_um", "F₀ / k̄", "µm", 1, "number"),
         Column("contact_percent", say("Contact"), say("% of time"), 1, "number"),
-        Column("floquet_max", say("Floquet"), "largest", 3, "number"),
+        Column("floquet_max", say("Floquet"), say("largest"), 3, "number"),
         Column("motion", say("Motion")),
         Column("method", say("Found by")),
     )
@@ -164,15 +165,15 @@ def _against_the_paper(result: FleetPrediction, states: list[GearState]) -> list
         if row is not None and row.condition == FIGURE_11_CONDITION and state.steady.dte_pp_m > 0.0:
             return [
                 say(
-                    "The paper ({paper}, section 4.3 and Fig. 11) prints {dte_pp_um:g} µm peak to "
-                    "peak for its condition {figure_11_condition}; here it is {dte_pp_m:.2f} µm. The "
+                    "The paper ({paper}, section 4.3 and Fig. 11) prints {printed:g} µm peak to "
+                    "peak for its condition {name}; here it is {calculated:.2f} µm. The "
                     "two cannot check each other: the paper prints no transmission error, torque, "
                     "inertia, bearing or damping. The figure here depends on what is assumed: "
                     "{assumed}.",
                     paper=say(PAPER),
-                    dte_pp_um=DTE_PP_UM,
-                    figure_11_condition=FIGURE_11_CONDITION,
-                    dte_pp_m=1000000.0 * state.steady.dte_pp_m,
+                    printed=DTE_PP_UM,
+                    name=FIGURE_11_CONDITION,
+                    calculated=1e6 * state.steady.dte_pp_m,
                     assumed=assumed_words(result.fleet),
                 )
             ]

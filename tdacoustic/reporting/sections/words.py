@@ -26,6 +26,7 @@ __all__ = [
     "pretty_signs",
     "pretty_unit",
     "probability_words",
+    "quantity_word",
     "same_line",
     "slug",
     "source_word",
@@ -43,6 +44,22 @@ SOURCE_WORDS = {
     "ambiguous": mark("ambiguous"),
     "unassigned": mark("unassigned"),
     "undecided": mark("undecided"),
+    "residual": mark("residual"),
+}
+
+SHAFT_WORDS = {"motor": mark("motor"), "wheelset": mark("wheelset")}
+
+QUANTITY_WORDS = {
+    "sound_pressure": mark("sound pressure"),
+    "acceleration": mark("acceleration"),
+    "speed": mark("speed"),
+    "torque": mark("torque"),
+    "current": mark("current"),
+    "voltage": mark("voltage"),
+    "force": mark("force"),
+    "temperature": mark("temperature"),
+    "tacho": mark("tacho"),
+    "other": mark("other"),
 }
 
 UNKNOWN_SPEED = mark("speed not known")
@@ -86,7 +103,7 @@ def speed_words(run: MeasuredRun) -> str:
     if run.train_speed_km_h is not None:
         words.append(f"{run.train_speed_km_h:.4g} km/h")
     if run.motor_speed_hz is not None:
-        words.append(say("motor {motor_speed_hz:.4g} rpm", motor_speed_hz=60.0 * run.motor_speed_hz))
+        words.append(say("motor {speed:.4g} rpm", speed=60.0 * run.motor_speed_hz))
     profile = None if run.measurement is None else run.measurement.speed.leading
     if profile is not None and run.measurement is not None:
         if run.measurement.steady and not words:  # nobody says of which shaft it is
@@ -94,15 +111,11 @@ def speed_words(run: MeasuredRun) -> str:
             words.append(f"{profile.channel} {factor * profile.mean:.4g} {unit}")
         elif not run.measurement.steady:
             factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
-            of_shaft = f"{profile.shaft} " if profile.shaft else ""
+            ends = {"lowest": factor * profile.speed.min(), "highest": factor * profile.speed.max(), "unit": unit}
             words.append(
-                say(
-                    "{of_shaft}{speed:.4g} to {speed_2:.4g} {unit}",
-                    of_shaft=of_shaft,
-                    speed=factor * profile.speed.min(),
-                    speed_2=factor * profile.speed.max(),
-                    unit=unit,
-                )
+                say("{shaft} {lowest:.4g} to {highest:.4g} {unit}", shaft=say(SHAFT_WORDS[profile.shaft]), **ends)
+                if profile.shaft
+                else say("{lowest:.4g} to {highest:.4g} {unit}", **ends)
             )
         if profile.source == "lines":
             words.append(say("read from lines"))
@@ -112,6 +125,17 @@ def speed_words(run: MeasuredRun) -> str:
 def source_word(name: str) -> str:
     """Name of a source as it is said; one that a fleet names itself stays as it is."""
     return say(SOURCE_WORDS.get(name, name))
+
+
+def quantity_word(quantity: str) -> str:
+    """Name of a channel's quantity as it is said.
+
+    Examples
+    --------
+    >>> quantity_word("sound_pressure")
+    'sound pressure'
+    """
+    return say(QUANTITY_WORDS.get(quantity, quantity.replace("_", " ")))
 
 
 def condition_words(analysis: Analysis, condition: str) -> str:
@@ -171,7 +195,8 @@ def joined(words: Sequence[str]) -> str:
     >>> joined(["a", "b", "c"]), joined(["a"])
     ('a, b and c', 'a')
     """
-    return " and ".join(part for part in (", ".join(words[:-1]), *words[-1:]) if part)
+    first, last = ", ".join(words[:-1]), "".join(words[-1:])
+    return say("{first} and {last}", first=first, last=last) if first and last else first or last
 
 
 def distinct_lines(sources: Iterable[SourceLine]) -> list[SourceLine]:
