@@ -24,7 +24,7 @@ def calibration_report(result: CampaignCalibration) -> Document:
     if campaign.origin == "synthetic":
         text = say("The levels come from signals made by a program. Nothing in this report was measured.")
         notices.append(Notice("synthetic", text))
-    columns = (Column("file", say("File")), Column("sha256", say("SHA-256")))
+    columns = (Column("file", say("File")), Column("sha256", "SHA-256"))
     provenance = Section(
         "provenance",
         say("How the numbers came about"),
@@ -36,7 +36,7 @@ def calibration_report(result: CampaignCalibration) -> Document:
     asked = None if result.what_if is None else what_if_section(result.what_if, result.calibration.fleet)
     return Document(
         title=campaign.name,
-        subtitle=say("The model of {name}, calibrated to the campaign's levels", name=result.fleet.name),
+        subtitle=say("The model of {fleet}, calibrated to the campaign's levels", fleet=result.fleet.name),
         origin=campaign.origin,
         summary=calibration_answer(result),
         notices=notices,

@@ -49,7 +49,7 @@ def fleet_report(gathering: Gathering) -> Document:
         notices=notices,
         sections=[section for section in found if section is not None],
         facts=_facts(gathering),
-        footer=[say("Made with tdacoustic {version}.", version=__version__), *(say(text) for text in MEASURED_FOOTER)],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), *map(say, MEASURED_FOOTER)],
     )
 
 

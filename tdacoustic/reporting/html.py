@@ -43,7 +43,7 @@ from tdacoustic.reporting.document import (
     walk,
 )
 from tdacoustic.reporting.figure import Heatmap
-from tdacoustic.reporting.language import say, spoken
+from tdacoustic.reporting.language import say, say_count, spoken
 from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
@@ -120,8 +120,8 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
         raw = f"{cell:.9g}"
         return view | {"raw": None if raw == text else raw}
     if column.kind == "source" and cell:
-        word = cell.split()[0].rstrip(",:")
-        view["chip"] = f"source-{word if word in _SOURCES else 'other'}"
+        known_source = next((word for word in sorted(_SOURCES) if cell.startswith((word, say(word)))), "other")
+        view["chip"] = f"source-{known_source}"
     if column.kind in ("origin", "verdict") and cell:
         known = column.kind == "origin" or cell in ("ok", "warning", "bad")
         view["chip"] = f"{column.kind}-{cell}" if known else "verdict-other"
@@ -331,16 +331,18 @@ def render_html(
     if views.full:
         still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
         text = say(
-            "Of the {still} figures of this page the first {interactive} can be zoomed; the others are still pictures, "
+            "Of the {all} figures of this page the first {count} can be zoomed; the others are still pictures, "
             "which keeps the page small.",
-            still=still,
-            interactive=views.interactive,
+            all=still,
+            count=views.interactive,
         )
         if views.left_out:
-            text += " " + say(
-                "The last {left_out} are left out; what they show is in result.h5 and the tables.",
-                left_out=views.left_out,
+            left_out = say_count(
+                "The last one is left out; what it shows is in result.h5 and the tables.",
+                "The last {count} are left out; what they show is in result.h5 and the tables.",
+                views.left_out,
             )
+            text = f"{text} {left_out}"
         document_notices = (*document.notices, Notice("info", text))
     else:
         document_notices = tuple(document.notices)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document, Fact, Notice, Section
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.answer import answer
 from tdacoustic.reporting.sections.clocks import clocks
 from tdacoustic.reporting.sections.contributions import contributions
@@ -28,7 +28,7 @@ from tdacoustic.results import Analysis
 
 __all__ = ["MEASURED_FOOTER", "measured_facts", "measured_report", "measured_sections"]
 
-MEASURED_FOOTER = ("Levels of sound pressure re 20 µPa, of acceleration re 1 µm/s².",)
+MEASURED_FOOTER = (mark("Levels of sound pressure re 20 µPa, of acceleration re 1 µm/s²."),)
 
 
 def measured_report(analysis: Analysis) -> Document:
@@ -53,7 +53,7 @@ def measured_report(analysis: Analysis) -> Document:
         notices=notices,
         sections=[*sections, provenance(analysis, behind)],
         facts=measured_facts(analysis),
-        footer=[say("Made with tdacoustic {version}.", version=__version__), *MEASURED_FOOTER],
+        footer=[say("Made with tdacoustic {version}.", version=__version__), *map(say, MEASURED_FOOTER)],
         lineage=lineage,
     )
 
@@ -68,8 +68,8 @@ def measured_facts(analysis: Analysis) -> list[Fact]:
     campaign = analysis.campaign
     n_runs = sum(run.measurement is not None for run in analysis.runs)
     return [
-        Fact(say("Conditions"), ", ".join(campaign.conditions()) or "none"),
-        Fact(say("Runs analysed"), say("{n_runs} of {n_runs_2}", n_runs=n_runs, n_runs_2=len(analysis.runs))),
+        Fact(say("Conditions"), ", ".join(campaign.conditions()) or say("none")),
+        Fact(say("Runs analysed"), say("{count} of {all}", count=n_runs, all=len(analysis.runs))),
         Fact(say("Channels"), str(len(campaign.channels))),
     ]
 

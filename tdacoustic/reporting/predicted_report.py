@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from tdacoustic import __version__
+from tdacoustic.drive.prediction import Prediction
 from tdacoustic.reporting.document import Document, Section
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.bearing_loads import bearing_loads
 from tdacoustic.reporting.sections.coupling import coupling_section
 from tdacoustic.reporting.sections.design_sweeps import design_sweeps
@@ -20,7 +21,6 @@ from tdacoustic.reporting.sections.meshing_noise import meshing_noise
 from tdacoustic.reporting.sections.model_parameters import model_parameters
 from tdacoustic.reporting.sections.near_field import near_field_section
 from tdacoustic.reporting.sections.paper_features import paper_features
-from tdacoustic.reporting.sections.printed import PAPER
 from tdacoustic.reporting.sections.sensitivity import sensitivity
 from tdacoustic.reporting.sections.sound_field import sound_field
 from tdacoustic.reporting.sections.speed_sweep import speed_sweep
@@ -31,8 +31,8 @@ from tdacoustic.results import FleetPrediction
 __all__ = ["PREDICTED_FOOTER", "predicted_report", "predicted_sections"]
 
 PREDICTED_FOOTER = (
-    "Forces are peak amplitudes, displacements peak to peak where so named.",
-    f"The paper, and its figures, tables and equations, are those of {PAPER}.",
+    mark("Forces are peak amplitudes, displacements peak to peak where so named."),
+    mark("The paper, and its figures, tables and equations, are those of Appl. Sci. 2025, 15, 10597."),
 )
 
 
@@ -44,7 +44,6 @@ def predicted_report(result: FleetPrediction) -> Document:
     result : FleetPrediction
     """
     prediction = result.prediction
-    speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
     return Document(
         title=result.fleet.name,
         subtitle=say("Noise and vibration of a traction drive: what the rapid model gives"),
@@ -53,18 +52,21 @@ def predicted_report(result: FleetPrediction) -> Document:
         sections=[*predicted_sections(result), gear_method(result)],
         facts=[
             (say("Conditions"), ", ".join(state.condition.name for state in prediction.conditions)),
-            (
-                say("Train speeds"),
-                " to ".join(dict.fromkeys(f"{speed:.4g} km/h" for speed in (min(speeds), max(speeds)))),
-            ),
+            (say("Train speeds"), _speeds_words(prediction)),
             (say("Teeth"), " : ".join(str(teeth) for teeth in prediction.unit.geometry.teeth)),
         ],
         footer=[
             say("Made with tdacoustic {version}.", version=__version__),
             say("Levels re 20 µPa."),
-            *PREDICTED_FOOTER,
+            *map(say, PREDICTED_FOOTER),
         ],
     )
+
+
+def _speeds_words(prediction: Prediction) -> str:
+    speeds = [state.condition.train_speed_km_h for state in prediction.conditions]
+    slowest, fastest = f"{min(speeds):.4g} km/h", f"{max(speeds):.4g} km/h"
+    return slowest if slowest == fastest else say("{slowest} to {fastest}", slowest=slowest, fastest=fastest)
 
 
 def predicted_sections(result: FleetPrediction) -> list[Section]:

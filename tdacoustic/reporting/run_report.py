@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tdacoustic import __version__
-from tdacoustic.reporting.document import Block, Document, Fact, Notice, Section, Sentences
+from tdacoustic.reporting.document import Block, Document, Fact, Notice, Section
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER, measured_facts, measured_sections
 from tdacoustic.reporting.predicted_report import PREDICTED_FOOTER, predicted_sections
@@ -14,7 +14,7 @@ from tdacoustic.reporting.sections.gear_answer import gear_overview
 from tdacoustic.reporting.sections.gear_method import method_sections
 from tdacoustic.reporting.sections.lineage import lineage_sections
 from tdacoustic.reporting.sections.method import method_of_measurement
-from tdacoustic.reporting.sections.provenance import ASSUMPTIONS, inputs_of, settings_of, steps_of, versions_of
+from tdacoustic.reporting.sections.provenance import assumptions_said, inputs_of, settings_of, steps_of, versions_of
 from tdacoustic.reporting.sections.run_answer import run_answer
 from tdacoustic.results import CampaignResult
 
@@ -45,8 +45,8 @@ def run_report(result: CampaignResult) -> Document:
         facts=[*measured_facts(analysis), *fleet],
         footer=[
             say("Made with tdacoustic {version}.", version=__version__),
-            *MEASURED_FOOTER,
-            *(PREDICTED_FOOTER if modelled else ()),
+            *map(say, MEASURED_FOOTER),
+            *map(say, PREDICTED_FOOTER if modelled else ()),
         ],
         lineage=lineage,
     )
@@ -88,7 +88,7 @@ def _provenance(result: CampaignResult, behind: Sequence[Block]) -> Section:
         *inputs_of(result.inputs),
         settings_of(result.settings),
         *method_of_measurement(result.analysis),
-        Section("assumptions", say("Assumptions on the recordings"), [Sentences(ASSUMPTIONS)]),
+        Section("assumptions", say("Assumptions on the recordings"), [assumptions_said()]),
         *(method_sections(result.prediction) if result.prediction is not None else ()),
         *behind,
         *steps_of(result),

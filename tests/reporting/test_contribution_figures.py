@@ -9,7 +9,9 @@ from tdacoustic.attribution import ContributionState
 from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart
 from tdacoustic.reporting.figure import Line
+from tdacoustic.reporting.language import Language, speaking
 from tdacoustic.reporting.sections.contribution_figures import over_speed
+from tdacoustic.reporting.sections.contributions import _run_up_words
 from tdacoustic.tables.contributions import contribution_tables
 
 REASON = "paths differ from state to state: alone, its sensors explain 99 % of this sound, by the paths of all 9 %"
@@ -69,3 +71,27 @@ def test_the_table_flags_what_is_left_where_the_paths_differ(reason, verdict):
     table = contribution_tables(found, None)["contributions"].set_index("part")
     assert table["verdict"]["residual"] == verdict
     assert table["reason"]["residual"] == ("paths differ from state to state: an upper bound" if reason else "")
+
+
+def test_in_another_language_bars_do_not_stretch_the_axis():
+    rows = [row("a", 40.0, 75.0), row("b", 50.0, 76.0)]
+    english, _ = figure(rows, {})
+    with speaking(Language("de", {"range": "Spanne", "{component}: range": "{component}: Spanne"})):
+        german, _ = figure(rows, {})
+    assert any(element.name == "motor: Spanne" for element in german.elements)
+    assert german.y_axis.limits == english.y_axis.limits
+
+
+def test_a_run_up_goes_from_speed_to_speed_in_every_language():
+    rows = [row("up", None, 80.0, False) for _ in range(2)]
+    rows = [
+        (ContributionState("up", "up", "up", None, hz, False), span, parts)
+        for hz, (_, span, parts) in zip((5.0, 20.0), rows, strict=True)
+    ]
+    assert _run_up_words(rows).startswith("a run-up from 300 to 1200 rpm: of the whole sound motor 60.0 to 60.0 dB")
+    german = {
+        "motor {speed:.4g} rpm": "bei {speed:.4g} rpm",
+        "a run-up from {first} to {last}": "von {first} auf {last}",
+    }
+    with speaking(Language("de", german)):
+        assert _run_up_words(rows).startswith("von 300 auf 1200 rpm: ")

@@ -191,7 +191,7 @@ def test_points_left_out_are_counted_in_words_and_tables(result):
         "Of 400 points in condition 2 3 rattle. Where the harmonic balance finds no"
     )
     silent = with_gaps(found, [7], ["spl_4m_db"])
-    assert "in condition 2 3 rattle and 1 make no sound" in left_out_words(sweep_sensitivity_of(silent))
+    assert "in condition 2 3 rattle and 1 makes no sound" in left_out_words(sweep_sensitivity_of(silent))
     assert left_out_words(sweep_sensitivity_of(made_up(lambda unit: both(80.0 + unit[:, 0])))) == ""
     tables = sweep_tables([found], [study])
     gaps = tables["sweeps"][tables["sweeps"]["reason"] == RATTLES]

@@ -3,7 +3,8 @@
 import pytest
 from read_pdf import ReadPdf, tight
 
-from tdacoustic.reporting import Axis, Bars, Document, Figure, FigureBlock, Paragraph, Section
+from tdacoustic.reporting import Axis, Bars, Column, Document, Figure, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.language import Language, speaking
 from tdacoustic.reporting.pdf import fonts, render_pdf
 from tdacoustic.reporting.pdf.fonts import plain, prepared
 
@@ -70,3 +71,17 @@ def test_the_parts_of_a_text_are_all_of_it() -> None:
     assert "".join(part for _, part in parts) == "株洲 шум a[U+1F600]"
     assert [font for font, _ in parts] == [held.chinese, fonts.BOLD]
     assert held.simple("plain µ") and not held.simple("株") and not held.simple("a\nb")
+
+
+def test_what_pages_say_themselves_is_in_those_fonts_in_the_language_of_the_report() -> None:
+    """Numbers of pages and of captions stand in no block: their signs are those of the translation alone."""
+    said = {"page {page} of {pages}": "第{page}页，共{pages}页", "Table {number}.": "表{number}。", "Contents": "目录"}
+    table = Table("t", "Caption", [Column("run", "Run")], [["a"]])
+    document = Document("Report", "", "measured", sections=[Section("one", "One", [table])])
+    with speaking(Language("zh", said)):
+        file = ReadPdf(render_pdf(document))
+    for words in ("第1页，共1页", "表1。", "目录"):
+        assert words in file.tight
+        assert words in tight(file.pdfium_text())
+    assert "[U+" not in file.tight
+    assert file.file.trailer["/Root"]["/Lang"] == "zh"

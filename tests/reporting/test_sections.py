@@ -2,6 +2,7 @@
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -10,12 +11,13 @@ import pytest
 from tdacoustic.reporting.document import Details, FigureBlock, Notice, Section, Sentences, Table, walk
 from tdacoustic.reporting.figure import Bars, Markers, Rule
 from tdacoustic.reporting.html import render_html
+from tdacoustic.reporting.language import Language, speaking
 from tdacoustic.reporting.measured_report import measured_report
-from tdacoustic.reporting.sections.answer import answer
+from tdacoustic.reporting.sections.answer import _rest_words, answer
 from tdacoustic.reporting.sections.kinematics import kinematics
 from tdacoustic.reporting.sections.side_by_side import side_by_side
 from tdacoustic.reporting.sections.sources import sources
-from tdacoustic.reporting.sections.words import pretty_signs, probability_words
+from tdacoustic.reporting.sections.words import joined, pretty_signs, probability_words
 from tdacoustic.workflows.analyze import analyze
 from tdacoustic.workflows.summary import summary_lines
 
@@ -396,3 +398,22 @@ def test_a_spread_between_runs_is_said_and_stands_in_the_table(plain):
     (table,) = [block for block in answer(found) if isinstance(block, Table)]
     assert [(row["n_runs"], row["spread_db"]) for row in rows(table)] == [(3, 2.34)] * 2
     assert not any("rests on a single run" in getattr(block, "text", "") for block in answer(found))
+
+
+def test_a_list_is_joined_in_the_language_that_is_spoken():
+    with speaking(Language("de", {"{first} and {last}": "{first} und {last}"})):
+        assert joined(["a", "b", "c"]) == "a, b und c"
+
+
+@pytest.mark.parametrize("texts", [{}, {"speed not known": "Drehzahl unbekannt"}])
+def test_lines_of_a_speed_that_is_not_known_may_move_in_every_language(texts):
+    measurement = SimpleNamespace(speed=SimpleNamespace(leading=None))
+    run = SimpleNamespace(
+        run=SimpleNamespace(kind="test", condition="slow"),
+        train_speed_km_h=None,
+        motor_speed_hz=None,
+        measurement=measurement,
+    )
+    analysis = SimpleNamespace(campaign=SimpleNamespace(excludes=()), runs=[run])
+    with speaking(Language("de", texts)):
+        assert _rest_words(analysis, "slow") == "the rest is broadband, or moves with a speed that is not known"

@@ -10,7 +10,7 @@ from typing import Any, Final
 from reportlab.platypus import CondPageBreak, Flowable, Image, NextPageTemplate, PageBreak, Paragraph
 
 from tdacoustic.reporting.document import Document, House, Notice, Section
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, spoken
 from tdacoustic.reporting.pdf.fonts import Fonts, prepared
 from tdacoustic.reporting.pdf.pages import ACROSS, LOWEST, UPRIGHT, WIDTHS, Book, Contents
 from tdacoustic.reporting.pdf.story import Piece, Story, section_numbers
@@ -36,7 +36,7 @@ def bound(document: Document) -> bytes:
     ----------
     document : Document
     """
-    fonts = prepared(_texts(document))
+    fonts = prepared([*_texts(document), *_translations()])
     story = Story(fonts, WIDTHS, section_numbers(document.sections), document.lineage)
     _head(story, document, fonts)
     if document.summary:
@@ -66,6 +66,13 @@ def _texts(value: Any) -> Iterator[str]:
             yield from _texts(item)
     elif isinstance(value, Mapping):
         yield from _texts(tuple(value.values()))
+
+
+def _translations() -> Iterator[str]:
+    """All texts of the language: the pages say some that no block of a document holds, as their numbers."""
+    yield from spoken().texts.values()
+    for forms in spoken().counted.values():
+        yield from forms
 
 
 def _head(story: Story, document: Document, fonts: Fonts) -> None:

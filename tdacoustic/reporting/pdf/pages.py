@@ -17,7 +17,7 @@ from reportlab.platypus.tableofcontents import TableOfContents
 
 from tdacoustic import __version__
 from tdacoustic.reporting.document import Document
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, spoken
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import REGULAR, Fonts, plain
 from tdacoustic.reporting.pdf.text import Anchored, style
@@ -104,7 +104,7 @@ class Book(BaseDocTemplate):
             author="",
             keywords=say("data: {origin}", origin=say(ORIGIN_WORDS[document.origin])),
             creator=f"tdacoustic {__version__}",
-            lang="en",
+            lang=spoken().code,
             invariant=1,
             pageCompression=1,
             displayDocTitle=True,

@@ -23,7 +23,7 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.document import Paragraph as Words
 from tdacoustic.reporting.figure import ReportError
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.layout import cut_text
 from tdacoustic.reporting.matplotlib_renderer import is_thinned
 from tdacoustic.reporting.palette import colour
@@ -40,6 +40,12 @@ _LONGEST_IN_CONTENTS: Final = 400
 """Signs of a title in the contents; a row of them is not broken over pages."""
 _FONT: Final = ("FONTNAME", (0, 0), (-1, -1), REGULAR)
 """reportlab's own default is not embedded, and would be named in the file though nothing is set in it."""
+_NUMBERED: Final = {
+    "figure": mark("Figure {number}."),
+    "table": mark("Table {number}."),
+    "sound": mark("Sound {number}."),
+}
+"""What a caption begins with."""
 _NOTICE_COLOURS: Final = {"info": "series-0", "warning": "series-4", "bad": "series-1", "synthetic": "series-3"}
 
 
@@ -206,7 +212,8 @@ class Story:
         """The link to how something came about, as it ends a caption."""
         if self._behind is None:
             return ""
-        where = markup(f"{say('How it came about')}: {self._numbers.get(self._behind, '')}".rstrip(": "), self._fonts)
+        words, number = say("How it came about"), self._numbers.get(self._behind, "")
+        where = markup(f"{words}: {number}" if number else words, self._fonts)
         return f' <a href="#{self._behind}" color="{colour("series-0")}">{where}</a>'
 
     def _put(self, flowable: Flowable, need: float, across: bool = False) -> None:
@@ -242,7 +249,7 @@ class Story:
 
     def _caption(self, kind: str, anchor: str, marked: str, name: str) -> Anchored:
         self._counts[kind] += 1
-        number = markup(f"{kind.capitalize()} {self._counts[kind]}.", self._fonts, bold=True)
+        number = markup(say(_NUMBERED[kind], number=self._counts[kind]), self._fonts, bold=True)
         made = Anchored(f"{number} {marked}", style(name))
         made.anchor = anchor
         return made
@@ -278,18 +285,18 @@ class Story:
         for part in parts:
             if part.columns is not None:
                 words = say(
-                    "Columns {first} to {last} of {many}.",
+                    "Columns {first} to {last} of {count}.",
                     first=part.columns[0],
                     last=part.columns[1],
-                    many=len(block.columns),
+                    count=len(block.columns),
                 )
                 self._lead(Paragraph(markup(words, self._fonts), style("small")))
             self._put(part.flowable, part.start_height, part.across)
         rows = len(block.rows)
         if rows > MOST_ROWS:
             held = say(
-                "The first {most} of {rows} rows; the HTML page has all and saves them as {file}.",
-                most=MOST_ROWS,
+                "The first {shown} of {rows} rows; the HTML page has all and saves them as {file}.",
+                shown=MOST_ROWS,
                 rows=rows,
                 file=block.csv_name,
             )

@@ -13,7 +13,7 @@ from reportlab.lib.colors import HexColor
 from reportlab.platypus import LongTable, Paragraph
 
 from tdacoustic.reporting.document import Cell, Column, Link, Table
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say_count
 from tdacoustic.reporting.layout import cut_text
 from tdacoustic.reporting.palette import colour
 from tdacoustic.reporting.pdf.fonts import REGULAR, Fonts
@@ -198,7 +198,9 @@ def _head(column: Column, fonts: Fonts) -> Paragraph:
 def _shortened(text: str) -> str:
     if len(text) <= MOST_SIGNS:
         return text
-    return say("{text}\u2026 ({more} more signs)", text=text[:MOST_SIGNS], more=len(text) - MOST_SIGNS)
+    left = len(text) - MOST_SIGNS
+    more = say_count("{count} more sign", "{count} more signs", left)
+    return f"{text[:MOST_SIGNS]}\u2026 ({more})"
 
 
 def _cell(column: Column, cell: Cell, room: float, fonts: Fonts) -> Any:

@@ -10,7 +10,7 @@ from tdacoustic.measured.levels import energy_mean_db
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Notice, Sentences
 from tdacoustic.reporting.language import mark, say, say_count
-from tdacoustic.reporting.sections.contributions import agreement_words
+from tdacoustic.reporting.sections.agreement import agreement_words
 from tdacoustic.reporting.sections.order_sentences import loudest_order_words
 from tdacoustic.reporting.sections.railway import railway_words
 from tdacoustic.reporting.sections.verdicts import verdicts_answer
@@ -82,7 +82,8 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
     runs = [run for run in analysis.runs if run.run.condition == condition and run.measurement is not None]
     stated = "" if runs else _stated_levels(analysis, condition)
     if stated or not level:
-        return f"{words}: {stated or say('no noise level, so no noise lines and no dominant source')}."
+        nothing = say("no noise level, so no noise lines and no dominant source")
+        return f"{words}: {stated or nothing}."
     agreement = agreement_words(analysis, condition)
     if runs and all(run.measurement is not None and not run.measurement.steady for run in runs):
         orders = [loudest_order_words(analysis, run, receivers(analysis.runs)) for run in runs]
@@ -270,7 +271,8 @@ def _stated_levels(analysis: Analysis, condition: str) -> str:
             value = f"{level.level_db:.1f} {unit} re 20 µPa"
             if level.distance_m is not None:
                 value = say("{level} at {distance:g} m", level=value, distance=level.distance_m)
-            words.append(f"{value} ({level.origin or say('origin not stated')})")
+            origin = level.origin or say("origin not stated")
+            words.append(f"{value} ({origin})")
     if not words:
         return ""
     return say("{levels}, stated and not recorded, so no lines and no dominant source", levels=joined(words))

@@ -16,8 +16,9 @@ from tdacoustic.reporting.document import (
     Sentences,
     Table,
 )
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.calibration_figures import (
+    conditions_of,
     contributions_figure,
     levels_figure,
     residuals_figure,
@@ -71,26 +72,31 @@ def _value_words(parameter: FittedParameter, fleet: Fleet) -> str:
 
 
 def _of_parameter(parameter: FittedParameter, fleet: Fleet) -> str:
-    key = parameter.key
-    text = say(
-        "{keyed} is {quantity_of} (it was {initial:.4g})",
-        keyed=keyed_words(key, fleet),
-        quantity_of=quantity_of(key, parameter.value),
-        initial=parameter.initial,
-    )
+    values = {
+        "parameter": keyed_words(parameter.key, fleet),
+        "quantity": quantity_of(parameter.key, parameter.value),
+        "initial": parameter.initial,
+    }
     if parameter.expression is not None:
-        return say("{text}, by {expression}.", text=text, expression=parameter.expression)
+        return say(
+            "{parameter} is {quantity} (it was {initial:.4g}), by {expression}.",
+            expression=parameter.expression,
+            **values,
+        )
+    now = say("{parameter} is {quantity} (it was {initial:.4g})", **values)
+    return f"{now}; {_interval_words(parameter)}."
+
+
+def _interval_words(parameter: FittedParameter) -> str:
+    """What the data say of a parameter's interval, as a clause."""
     if parameter.ci95 is None:
-        return say("{text}; the data give no interval.", text=text)
+        return say("the data give no interval")
     if parameter.ci95 == (None, None):
         return say(
-            "{text}; its 95 % interval reaches from bound to bound, {low:g} to {high:g}.",
-            text=text,
-            low=parameter.low,
-            high=parameter.high,
+            "its 95 % interval reaches from bound to bound, {low:g} to {high:g}", low=parameter.low, high=parameter.high
         )
-    low, high = ("open" if end is None else f"{end:.4g}" for end in parameter.ci95)
-    return say("{text}; 95 % interval {low} to {high}.", text=text, low=low, high=high)
+    low, high = (say("open") if end is None else f"{end:.4g}" for end in parameter.ci95)
+    return say("95 % interval {low} to {high}", low=low, high=high)
 
 
 def _rms(errors: list[float]) -> float:
@@ -102,20 +108,19 @@ def _misfit_words(result: CampaignCalibration) -> str:
     before = _rms([level.before_db - level.datum.level_db for level in found.levels])
     after = [level.error_db for level in found.levels]
     worst = max(found.levels, key=lambda level: abs(level.error_db))
-    text = say(
-        "The levels are off by {before:.1f} dB rms before and by {rms:.1f} dB rms after the "
-        "calibration, at most by {error_db:.1f} dB (condition {name})",
-        before=before,
-        rms=_rms(after),
-        error_db=abs(worst.error_db),
-        name=worst.datum.condition.name,
-    )
-    if _beside_the_paper(result):
-        text += say(
-            "; the paper states a largest error of {largest_error_db:g} dB of its model",
-            largest_error_db=LARGEST_ERROR_DB,
+    clauses = [
+        say(
+            "The levels are off by {before:.1f} dB rms before and by {after:.1f} dB rms after the "
+            "calibration, at most by {largest:.1f} dB (condition {condition})",
+            before=before,
+            after=_rms(after),
+            largest=abs(worst.error_db),
+            condition=worst.datum.condition.name,
         )
-    return f"{text}."
+    ]
+    if _beside_the_paper(result):
+        clauses.append(say("the paper states a largest error of {error:g} dB of its model", error=LARGEST_ERROR_DB))
+    return f"{'; '.join(clauses)}."
 
 
 def _beside_the_paper(result: CampaignCalibration) -> bool:
@@ -132,11 +137,11 @@ def _next_words(found: Calibration) -> list[str]:
     parts = [f"{key_words(name, found.fleet)} {100.0 * part:.0f} %" for name, part in best.remaining.items()]
     return [
         say(
-            "What would tell most next is a level at {train_speed_km_h:.3g} km/h and "
-            "{torque_n_m:.4g} N m, {name}: of the intervals it would leave {parts}.",
-            train_speed_km_h=best.condition.train_speed_km_h,
-            torque_n_m=best.condition.torque_n_m,
-            name=best.receiver.name,
+            "What would tell most next is a level at {speed:.3g} km/h and "
+            "{torque:.4g} N m, {receiver}: of the intervals it would leave {parts}.",
+            speed=best.condition.train_speed_km_h,
+            torque=best.condition.torque_n_m,
+            receiver=best.receiver.name,
             parts=", ".join(parts),
         )
     ]
@@ -160,32 +165,42 @@ def calibration_section(result: CampaignCalibration) -> Section:
 
 def _method_words(found: Calibration) -> str:
     scatter = (
-        say("{model_sigma_db:.2g} dB, taken from the misfit", model_sigma_db=found.model_sigma_db)
+        say("{sigma:.2g} dB, taken from the misfit", sigma=found.model_sigma_db)
         if found.model_sigma_is_fitted
-        else say("{model_sigma_db:g} dB, by [calibration] model_sigma_db", model_sigma_db=found.model_sigma_db)
+        else say("{sigma:g} dB, by [calibration] model_sigma_db", sigma=found.model_sigma_db)
     )
-    loss = "" if found.settings.loss == "linear" else say(" with the robust loss {loss}", loss=found.settings.loss)
-    interpolated = (
-        ""
-        if found.interpolated_db is None
-        else say(
-            " The search went over levels interpolated between computed ones (largest "
-            "difference at checked places {interpolated_db:.2g} dB); the levels after it are "
-            "computed.",
-            interpolated_db=found.interpolated_db,
+    settings = found.settings
+    said = [
+        say_count(
+            "The levels are fitted by weighted least squares from {count} start (lmfit).",
+            "The levels are fitted by weighted least squares from {count} starts (lmfit).",
+            settings.starts,
         )
-    )
-    return say(
-        "The levels are fitted by weighted least squares{loss} from {starts} starts (lmfit). A "
-        "datum's standard deviation is that of the measurement and of the model together "
-        "({scatter}): the model's is what its lines on unknown modes scatter by, and the "
-        "receivers of a condition share it. Intervals are by profile likelihood; an end that a "
-        "bound comes before is left open.{interpolated}",
-        loss=loss,
-        starts=found.settings.starts,
-        scatter=scatter,
-        interpolated=interpolated,
-    )
+        if settings.loss == "linear"
+        else say_count(
+            "The levels are fitted by weighted least squares with the robust loss {loss} from {count} start (lmfit).",
+            "The levels are fitted by weighted least squares with the robust loss {loss} from {count} starts (lmfit).",
+            settings.starts,
+            loss=settings.loss,
+        ),
+        say(
+            "A datum's standard deviation is that of the measurement and of the model together "
+            "({scatter}): the model's is what its lines on unknown modes scatter by, and the "
+            "receivers of a condition share it. Intervals are by profile likelihood; an end that a "
+            "bound comes before is left open.",
+            scatter=scatter,
+        ),
+    ]
+    if found.interpolated_db is not None:
+        said.append(
+            say(
+                "The search went over levels interpolated between computed ones (largest "
+                "difference at checked places {difference:.2g} dB); the levels after it are "
+                "computed.",
+                difference=found.interpolated_db,
+            )
+        )
+    return " ".join(said)
 
 
 def _printed_words(result: CampaignCalibration) -> str:
@@ -193,10 +208,10 @@ def _printed_words(result: CampaignCalibration) -> str:
     ours = {item.condition: item.after_db for item in result.over_speed}
     parts = [
         say(
-            "{ours:.1f} against {level_db:g} dB in condition {conditions}",
+            "{ours:.1f} against {printed:g} dB in condition {condition}",
             ours=ours[row.conditions[0]],
-            level_db=row.level_db,
-            conditions=row.conditions[0],
+            printed=row.level_db,
+            condition=row.conditions[0],
         )
         for row in MODEL_4M
         if len(row.conditions) == 1 and not math.isnan(ours.get(row.conditions[0], math.nan))
@@ -204,45 +219,47 @@ def _printed_words(result: CampaignCalibration) -> str:
     if not _beside_the_paper(result) or not parts:
         return ""
     open_row = next(row for row in MODEL_4M if len(row.conditions) > 1)
-    text = say(
-        "The calibrated model beside the paper's own, as printed with its Fig. 16: {parts}", parts=", ".join(parts)
-    )
-    text += say(
-        "; {level_db:g} dB is printed of condition {conditions}.",
-        level_db=open_row.level_db,
-        conditions=" or ".join(open_row.conditions),
-    )
+    said = [
+        say(
+            "The calibrated model beside the paper's own, as printed with its Fig. 16: {levels}; {printed:g} dB is "
+            "printed of condition {conditions}.",
+            levels=", ".join(parts),
+            printed=open_row.level_db,
+            conditions=conditions_of(open_row),
+        )
+    ]
     fast = [ours.get(name, math.nan) for name in ("5", "6")]
     if fast[1] >= fast[0]:
-        text += say(
-            " The paper's level falls from condition 5 to 6; the calibrated model has {fast:.1f} "
-            "and {fast_2:.1f} dB there.",
-            fast=fast[0],
-            fast_2=fast[1],
+        said.append(
+            say(
+                "The paper's level falls from condition 5 to 6; the calibrated model has {fifth:.1f} "
+                "and {sixth:.1f} dB there.",
+                fifth=fast[0],
+                sixth=fast[1],
+            )
         )
-    return text
+    return " ".join(said)
 
 
 def _told(found: Calibration) -> list[Block]:
-    number = found.condition_number
+    directions = {"rank": found.rank, "moved": len(found.moved)}
     seen = (
-        say(
-            "The levels see {rank} of {n_moved} directions among the parameters",
-            rank=found.rank,
-            n_moved=len(found.moved),
-        )
-        + (
-            ""
-            if number is None
-            else say(" (condition number of the Jacobian, columns of length one: {number:.3g})", number=number)
-        )
-        + say(
-            ". Chi square is {chi_square:.3g} with {degrees_of_freedom} degrees of freedom.",
-            chi_square=found.chi_square,
-            degrees_of_freedom=found.degrees_of_freedom,
+        say("The levels see {rank} of {moved} directions among the parameters.", **directions)
+        if found.condition_number is None
+        else say(
+            "The levels see {rank} of {moved} directions among the parameters (condition number of the Jacobian, "
+            "columns of length one: {condition_number:.3g}).",
+            condition_number=found.condition_number,
+            **directions,
         )
     )
-    blocks: list[Block] = [Paragraph(seen)]
+    fit = say_count(
+        "Chi square is {chi_square:.3g} with {count} degree of freedom.",
+        "Chi square is {chi_square:.3g} with {count} degrees of freedom.",
+        found.degrees_of_freedom,
+        chi_square=found.chi_square,
+    )
+    blocks: list[Block] = [Paragraph(f"{seen} {fit}")]
     tables: list[Table | None] = [correlation_table(found), transfer_table(found), posterior_table(found)]
     blocks += [table for table in tables if table is not None]
     following = next_measurement_table(found)

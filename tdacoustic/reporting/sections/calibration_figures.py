@@ -11,18 +11,20 @@ import numpy as np
 from tdacoustic.drive import DriveSound
 from tdacoustic.fitting.calibration import FittedLevel
 from tdacoustic.reporting.figure import Axis, Band, Figure, Line, LineStyle, Markers, Symbol
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.printed import (
     LARGEST_ERROR_DB,
     MEASURED_4M,
     MODEL_4M,
+    PrintedLevel,
     is_of_the_paper,
 )
 from tdacoustic.reporting.sections.sound_paths import heard_paths, total_words
 from tdacoustic.reporting.sections.words import joined
+from tdacoustic.reporting.shown import ORIGIN_WORDS
 from tdacoustic.results import CampaignCalibration
 
-__all__ = ["contributions_figure", "levels_figure", "residuals_figure"]
+__all__ = ["conditions_of", "contributions_figure", "levels_figure", "residuals_figure"]
 
 SYMBOLS: Final[dict[str, Symbol]] = {"measured": "circle", "synthetic": "diamond", "printed": "square"}
 _OVERALL: Final = "overall"
@@ -67,7 +69,12 @@ def levels_figure(result: CampaignCalibration) -> Figure | None:
     for slot, origin in enumerate(dict.fromkeys(level.datum.origin for level in held)):
         of_origin = [level for level in held if level.datum.origin == origin]
         elements.append(
-            _levels(of_origin, say("level, {origin} (± 1 σ)", origin=origin), SYMBOLS.get(origin, "circle"), slot)
+            _levels(
+                of_origin,
+                say("level, {origin} (± 1 σ)", origin=say(ORIGIN_WORDS[origin])),
+                SYMBOLS.get(origin, "circle"),
+                slot,
+            )
         )
     if is_of_the_paper(result.fleet) and result.campaign.origin != "measured":
         elements += _of_paper(result)
@@ -76,8 +83,8 @@ def levels_figure(result: CampaignCalibration) -> Figure | None:
     return Figure(
         "calibration-over-speed",
         say(
-            "Levels at {value:g} m over the train's speed, and the model before and after the calibration",
-            value=result.fleet.radiation.sphere_radius_m.value,
+            "Levels at {distance:g} m over the train's speed, and the model before and after the calibration",
+            distance=result.fleet.radiation.sphere_radius_m.value,
         ),
         say(
             "One dot a condition; the lines between them only lead the eye. Conditions without a level are the model's "
@@ -96,7 +103,11 @@ def _levels(held: list[FittedLevel], name: str, symbol: Symbol, slot: int) -> Ma
         np.array([level.datum.level_db for level in held]),
         name,
         texts=[
-            say("condition {name}, {name_2}", name=level.datum.condition.name, name_2=level.datum.receiver.name)
+            say(
+                "condition {condition}, {receiver}",
+                condition=level.datum.condition.name,
+                receiver=level.datum.receiver.name,
+            )
             for level in held
         ],
         symbol=symbol,
@@ -120,10 +131,10 @@ def _of_paper(result: CampaignCalibration) -> list[Markers]:
                 np.array([speed for speed, _ in model]),
                 np.array([row.level_db for _, row in model]),
                 say(
-                    "the paper's model, printed, ± its largest error of {largest_error_db:g} dB",
-                    largest_error_db=LARGEST_ERROR_DB,
+                    "the paper's model, printed, ± its largest error of {error:g} dB",
+                    error=LARGEST_ERROR_DB,
                 ),
-                texts=[say("condition {conditions}", conditions=" or ".join(row.conditions)) for _, row in model],
+                texts=[say("condition {condition}", condition=conditions_of(row)) for _, row in model],
                 symbol="triangle",
                 errors=np.full(len(model), LARGEST_ERROR_DB),
                 color=3,
@@ -138,12 +149,20 @@ def _of_paper(result: CampaignCalibration) -> list[Markers]:
                 np.array([speed for speed, _ in measured]),
                 np.array([row.level_db for _, row in measured]),
                 say("the paper's measurement, printed"),
-                texts=[say("condition {conditions}", conditions=row.conditions[0]) for _, row in measured],
+                texts=[say("condition {condition}", condition=row.conditions[0]) for _, row in measured],
                 symbol="x",
                 color=1,
             )
         )
     return found
+
+
+def conditions_of(row: PrintedLevel) -> str:
+    """Return the condition that the paper prints a level of; both where it leaves open which of two."""
+    if len(row.conditions) == 1:
+        return row.conditions[0]
+    first, second = row.conditions
+    return say("{first} or {second}", first=first, second=second)
 
 
 def contributions_figure(result: CampaignCalibration) -> Figure | None:
@@ -155,26 +174,26 @@ def contributions_figure(result: CampaignCalibration) -> Figure | None:
     speeds = {level.datum.condition.name: level.datum.condition.train_speed_km_h for level in held}
     elements: list[Line] = []
     sides: tuple[tuple[Iterable[DriveSound], str, LineStyle], ...] = (
-        (result.calibration.before, "before", "dotted"),
-        (result.calibration.after, "after", "solid"),
+        (result.calibration.before, mark("{path}, before"), "dotted"),
+        (result.calibration.after, mark("{path}, after"), "solid"),
     )
     drawn = []
     for path in heard_paths((*result.calibration.before, *result.calibration.after)):
         for sounds, words, style in sides:
             x, y = _over_speed(sounds, speeds, receiver, path.key)
             if y.size and not np.isnan(y).all():
-                elements.append(Line(x, y, f"{path.name}, {words}", style=style, color=path.slot, points=True))
+                elements.append(Line(x, y, say(words, path=say(path.name)), style=style, color=path.slot, points=True))
                 drawn.append(path)
     if not elements:
         return None
     return Figure(
         "calibration-contributions",
         say(
-            "What {name} contribute at {receiver}, before and after the calibration",
-            name=joined([path.name for path in dict.fromkeys(drawn)]),
+            "What {paths} contribute at {receiver}, before and after the calibration",
+            paths=joined([say(path.name) for path in dict.fromkeys(drawn)]),
             receiver=receiver,
         ),
-        say("Unweighted levels of each path alone. {total}", total=total_words(result.fleet, dict.fromkeys(drawn))),
+        " ".join([say("Unweighted levels of each path alone."), total_words(result.fleet, dict.fromkeys(drawn))]),
         Axis(say("Train speed"), "km/h"),
         Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         elements,

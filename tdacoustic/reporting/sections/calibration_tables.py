@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from tdacoustic.fitting.calibration import Calibration
+from tdacoustic.fitting.measured_level import MeasuredLevel
 from tdacoustic.reporting.document import Cell, Column, Table
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.parameters import key_words
 from tdacoustic.reporting.sections.sound_paths import heard_paths
 from tdacoustic.reporting.sections.words import pretty_signs
@@ -28,6 +29,15 @@ __all__ = [
 MOST_ROWS: Final = 8
 """Candidates for the next measurement that are shown."""
 
+_WHAT: Final = {"overall": mark("overall"), "mesh order": mark("mesh order")}
+_TITLES: Final = {
+    "motor": (mark("Motor before"), mark("Motor after")),
+    "mesh": (mark("Meshing before"), mark("Meshing after")),
+    "structure": (mark("Structure before"), mark("Structure after")),
+    "total": (mark("Total before"), mark("Total after")),
+}
+"""Of a path before and after the calibration."""
+
 
 def parameters_table(found: Calibration) -> Table:
     """Return the fitted values with their intervals, bounds and priors."""
@@ -46,7 +56,7 @@ def parameters_table(found: Calibration) -> Table:
     rows: list[list[Cell]] = []
     for p in found.parameters:
         low, high = (None, None) if p.ci95 is None else p.ci95
-        before = p.expression or ("none" if p.prior is None else f"{p.prior[0]:.4g} ± {p.prior[1]:.3g}")
+        before = p.expression or (say("none") if p.prior is None else f"{p.prior[0]:.4g} ± {p.prior[1]:.3g}")
         bounds, before = (pretty_signs(text) for text in (say("{low:g} to {high:g}", low=p.low, high=p.high), before))
         unit = unit_of(p.key) if "." in p.key else ""
         words = key_words(p.key, found.fleet)
@@ -79,7 +89,7 @@ def levels_table(result: CampaignCalibration) -> Table:
             [
                 datum.condition.name,
                 datum.condition.train_speed_km_h,
-                datum.what if datum.weighting == "Z" else say("{what}, A-weighted", what=datum.what),
+                _what(datum) if datum.weighting == "Z" else say("{what}, A-weighted", what=_what(datum)),
                 datum.receiver.name,
                 datum.origin,
                 datum.level_db,
@@ -94,6 +104,11 @@ def levels_table(result: CampaignCalibration) -> Table:
     return Table("calibration-levels", say("Levels and model by condition"), columns, rows)
 
 
+def _what(datum: MeasuredLevel) -> str:
+    """What of the sound a level is of; a third octave stays as it is named."""
+    return say(_WHAT.get(datum.what, datum.what))
+
+
 def sources_table(result: CampaignCalibration) -> Table:
     """Return where each datum and its standard deviation come from."""
     columns = (
@@ -104,28 +119,27 @@ def sources_table(result: CampaignCalibration) -> Table:
         Column("source", say("From")),
     )
     data = [level.datum for level in result.calibration.levels]
-    rows: list[list[Cell]] = [[d.condition.name, d.what, d.receiver.name, d.sigma_db, d.source] for d in data]
+    rows: list[list[Cell]] = [[d.condition.name, _what(d), d.receiver.name, d.sigma_db, d.source] for d in data]
     return Table("calibration-level-sources", say("Where the levels come from"), columns, rows)
 
 
 def contributions_table(found: Calibration) -> Table:
     """Return the level of each path at each receiver, before and after; of the structure where it has one."""
     heard = [path.key for path in heard_paths((*found.before, *found.after))]
-    titles = {"motor": say("Motor"), "mesh": say("Meshing"), "structure": say("Structure"), "total": say("Total")}
-    titles = {path: title for path, title in titles.items() if path != "structure" or path in heard}
+    paths = [path for path in _TITLES if path != "structure" or path in heard]
     columns = (
         Column("condition", say("Condition")),
         Column("receiver", say("At")),
         *(
-            Column(f"{path}_{side}_db", f"{title} {side}", "dB", 1, "number")
-            for path, title in titles.items()
-            for side in ("before", "after")
+            Column(f"{path}_{side}_db", say(title), "dB", 1, "number")
+            for path in paths
+            for side, title in zip(("before", "after"), _TITLES[path], strict=True)
         ),
     )
     rows: list[list[Cell]] = []
     for before, after in zip(found.before, found.after, strict=True):
         for receiver in dict.fromkeys(level.receiver for level in before.levels):
-            levels = [sound.level_db(receiver, path) for path in titles for sound in (before, after)]
+            levels = [sound.level_db(receiver, path) for path in paths for sound in (before, after)]
             rows.append([before.condition, receiver, *levels])
     return Table("calibration-contributions-table", say("Contributions"), columns, rows, origin="calculated")
 
@@ -180,9 +194,9 @@ def posterior_table(found: Calibration) -> Table | None:
         Column("median", say("Median"), kind="number"),
         Column("low", say("95 % from"), kind="number"),
         Column("high", say("95 % to"), kind="number"),
-        Column("autocorrelation", say("Autocorrelation"), "steps", 1, "number"),
+        Column("autocorrelation", say("Autocorrelation"), say("steps"), 1, "number"),
         Column("effective_samples", say("Effective samples"), digits=0, kind="number"),
-        Column("r_hat", say("R-hat"), digits=3, kind="number"),
+        Column("r_hat", "R-hat", digits=3, kind="number"),
     )
     rows: list[list[Cell]] = [
         [p.key, p.median, *p.ci95, p.autocorrelation, p.effective_samples, p.r_hat] for p in found.posterior.parameters

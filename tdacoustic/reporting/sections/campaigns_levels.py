@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import statistics
 from collections.abc import Sequence
 from typing import Final
 
@@ -13,15 +12,12 @@ from tdacoustic.gathering.levels import BandMedian, LevelPoint, band_medians, gr
 from tdacoustic.gathering.outliers import BAND_KM_H
 from tdacoustic.gathering.overview import Origin
 from tdacoustic.gathering.speed_bands import SpeedBand, band_at, band_width
-from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
+from tdacoustic.reporting.document import Block, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Band, Figure, Line, Markers, Symbol
 from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.campaigns_levels_table import levels_table
 from tdacoustic.reporting.sections.campaigns_rows import (
     MOST_POINTS,
-    MOST_ROWS,
-    SHOWN_ROWS,
-    captioned,
-    name_cell,
     short,
     shown_of,
     spread_out,
@@ -34,7 +30,6 @@ __all__ = ["campaigns_levels"]
 MOST_LINES: Final = 6
 """Trains, or fleets, that a figure draws one by one; the seventh and eighth colours are the single values'."""
 
-MOST_BANDS: Final = 10
 OVER_YEARS: Final = 4
 GREY: Final = 7
 
@@ -45,13 +40,6 @@ _EXPLAINED: Final = mark(
     "microphones is not here."
 )
 _SHOWN: Final = mark("Shown are {shown} of {held} recorded values; all are in dataset/{table}.parquet.")
-_LEVEL_FROM: Final = {"recorded": mark("recorded"), "stated": mark("stated")}
-_CORRECTIONS: Final = {
-    "none": mark("none"),
-    "applied": mark("applied"),
-    "marginal": mark("marginal"),
-    "impossible": mark("impossible"),
-}
 
 
 def campaigns_levels(gathering: Gathering) -> Section | None:
@@ -62,7 +50,7 @@ def campaigns_levels(gathering: Gathering) -> Section | None:
         return None
     blocks: list[Block] = [Paragraph(say(_EXPLAINED))]
     for origin, points in held:
-        blocks += [_over_speed(origin, points), *_over_years(origin, points), _table(gathering, origin, points)]
+        blocks += [_over_speed(origin, points), *_over_years(origin, points), levels_table(gathering, origin, points)]
     return Section("levels", say("Levels at 4 m"), blocks)
 
 
@@ -132,8 +120,9 @@ def _trains(points: Sequence[LevelPoint]) -> list[tuple[str, list[LevelPoint]]]:
     """Points by train; one that several fleets have with the fleet's name."""
     found = grouped(points, _train)
     names = [train for train, _ in found]
+    no_fleet = say("no fleet")
     return [
-        (train if names.count(train) == 1 else f"{train}, {fleet or say('no fleet')}", held)
+        (train if names.count(train) == 1 else f"{train}, {fleet or no_fleet}", held)
         for (train, fleet), held in found.items()
     ]
 
@@ -284,50 +273,3 @@ def _chosen(usable: dict[tuple[str, SpeedBand], list[LevelPoint]]) -> list[tuple
         common = max(counts, key=lambda band: (counts[band], band))
         ranked = [key for key in ranked if key[1] == common]
     return ranked[:OVER_YEARS]
-
-
-# ---------------------------------------------------------------- table
-
-
-def _table(gathering: Gathering, origin: Origin, points: Sequence[LevelPoint]) -> Table:
-    width = band_width((point.speed_km_h for point in points), MOST_BANDS)
-    bands = sorted({band_at(point.speed_km_h, width) for point in points})
-    trains = grouped(points, _whose)
-    stated = any(point.row.level_from == "stated" for point in points)
-    corrected = any(point.row.correction != "none" for point in points)
-    columns = [
-        Column("train", say("Train, else campaign")),
-        Column("fleet", say("Fleet")),
-        *([Column("level_from", say("Levels"))] if stated else []),
-        Column("years", say("Years")),
-        Column("values", say("Values"), kind="number", digits=0),
-        *(Column(f"band_{band.low:.16g}_km_h", band.words, "km/h", digits=1, kind="number") for band in bands),
-        *([Column("corrected", say("Background correction"))] if corrected else []),
-    ]
-    rows: list[list[Cell]] = []
-    for key in sorted(trains)[:MOST_ROWS]:
-        fleet, *_, level_from = key
-        held = trains[key]
-        levels = grouped(held, lambda point: band_at(point.speed_km_h, width))
-        medians: list[Cell] = [
-            statistics.median(point.level_db for point in levels[band]) if band in levels else None for band in bands
-        ]
-        results = list({id(point.result): point.result for point in held}.values())
-        corrections = [say(_CORRECTIONS.get(word, word)) for word in sorted({point.row.correction for point in held})]
-        years = sorted({result.identity.year for result in results if result.identity.year is not None})
-        span = "" if not years else str(years[0]) if len(years) == 1 else f"{years[0]}–{years[-1]}"
-        whose: list[Cell] = [
-            name_cell(gathering, results),
-            fleet or None,
-            *([say(_LEVEL_FROM.get(level_from, level_from))] if stated else []),
-        ]
-        rows.append([*whose, span or None, len(held), *medians, *([", ".join(corrections)] if corrected else [])])
-    left_out = shown_of(len(rows), len(trains), SHOWN_ROWS, "overview")
-    caption = say("Levels at 4 m in dB re 20 µPa by speed band, {origin}: medians", origin=say(ORIGIN_WORDS[origin]))
-    return Table(f"levels-{origin}", captioned(caption, left_out), columns, rows, origin=origin)
-
-
-def _whose(point: LevelPoint) -> tuple[str, bool, str, str]:
-    """What makes a row: recorded and stated levels are not mixed."""
-    result = point.result
-    return result.fleet, not result.identity.train, result.train, point.row.level_from

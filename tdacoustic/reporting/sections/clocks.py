@@ -13,20 +13,6 @@ from tdacoustic.results import Analysis
 
 __all__ = ["clocks"]
 
-_COLUMNS = (
-    Column("run", "Run"),
-    Column("log", "Log"),
-    Column("reference_log", "Reference"),
-    Column("method", "Method"),
-    Column("offset_s", "Starts at", "s", 6, "number"),
-    Column("offset_error_us", "Error", "µs", 3, "number"),
-    Column("drift_ppm", "Drift", "ppm", 3, "number"),
-    Column("drift_error_ppm", "Error", "ppm", 3, "number"),
-    Column("axis_error", "Error of an instant", "samples", 4, "number"),
-    Column("coherence", "Coherence", "", 3, "number"),
-    Column("peak_ratio", "Peak over next", "", 2, "number"),
-    Column("doubt", "Doubt"),
-)
 _METHODS = {"start": mark("started together"), "time_stamps": mark("time stamps"), "shared": mark("shared signal")}
 _METHOD = mark(
     "A log's time is moved and its sampling rate corrected to the reference log's clock; its samples stay as they are. "
@@ -52,11 +38,28 @@ def clocks(analysis: Analysis) -> Section | None:
     blocks += [Notice("warning", pretty_signs(doubt)) for doubt in doubts]
     rows = [_cells(run, clock) for run in held.values() for clock in run.clocks]
     origin = analysis.campaign.origin
-    blocks.append(Table("clocks", say("Clocks of the logs"), _COLUMNS, rows, origin=origin))
+    blocks.append(Table("clocks", say("Clocks of the logs"), _columns(), rows, origin=origin))
     for run in held.values():
         blocks += [FigureBlock(_figure(run, clock), origin) for clock in run.clocks if _has_figure(clock)]
     blocks.append(Paragraph(say(_METHOD)))
     return Section("clocks", say("Several logs on one time axis"), blocks)
+
+
+def _columns() -> tuple[Column, ...]:
+    return (
+        Column("run", say("Run")),
+        Column("log", say("Log")),
+        Column("reference_log", say("Reference")),
+        Column("method", say("Method")),
+        Column("offset_s", say("Starts at"), "s", 6, "number"),
+        Column("offset_error_us", say("Error"), "µs", 3, "number"),
+        Column("drift_ppm", say("Drift"), "ppm", 3, "number"),
+        Column("drift_error_ppm", say("Error"), "ppm", 3, "number"),
+        Column("axis_error", say("Error of an instant"), say("samples"), 4, "number"),
+        Column("coherence", say("Coherence"), "", 3, "number"),
+        Column("peak_ratio", say("Peak over next"), "", 2, "number"),
+        Column("doubt", say("Doubt")),
+    )
 
 
 def _sentence(run: RunClocks) -> str:
@@ -64,43 +67,52 @@ def _sentence(run: RunClocks) -> str:
     others = ", ".join(clock.log for clock in run.clocks)
     if run.method == "start":
         return say(
-            "Run {run}: {others} and {reference_log} are taken as started together; no drift is corrected.",
+            "Run {run}: {logs} and {reference} are taken as started together; no drift is corrected.",
             run=run.run,
-            others=others,
-            reference_log=first.reference_log,
+            logs=others,
+            reference=first.reference_log,
         )
     if run.method == "time_stamps":
-        parts = [say("{log} {offset_s:.6g} s after it", log=clock.log, offset_s=clock.offset_s) for clock in run.clocks]
+        starts = [say("{log} {offset:.6g} s after it", log=clock.log, offset=clock.offset_s) for clock in run.clocks]
         return say(
-            "Run {run}: by their time stamps the logs start at {reference_log}'s and {parts}; no drift is corrected.",
+            "Run {run}: by their time stamps the logs start at {reference}'s and {starts}; no drift is corrected.",
             run=run.run,
-            reference_log=first.reference_log,
-            parts=", ".join(parts),
+            reference=first.reference_log,
+            starts=", ".join(starts),
         )
-    parts = [
-        say(
-            "{log} starts at {offset_s:.6f} s and its clock runs {drift_ppm:.3g} ppm {value}{value_2}",
-            log=clock.log,
-            offset_s=clock.offset_s,
-            drift_ppm=abs(clock.drift_ppm or 0.0),
-            value="fast" if (clock.drift_ppm or 0.0) > 0.0 else "slow",
-            value_2=say(" (its shared channel has the sign turned round)")
-            if clock.estimate and clock.estimate.inverted
-            else "",
-        )
-        for clock in run.clocks
-    ]
     errors = [_axis_error(clock) for clock in run.clocks]
     worst = max((error for error in errors if error is not None), default=0.0)
     return say(
-        "Run {run}: by the shared signal and {reference_log}'s clock, {parts}. Any instant that "
-        "both logs hold is known within {worst:.2g} samples (standard error); nothing is "
-        "resampled by that.",
+        "Run {run}: by the shared signal and {reference}'s clock, {clocks}. Any instant that both logs hold is known "
+        "within {error:.2g} samples (standard error); nothing is resampled by that.",
         run=run.run,
-        reference_log=first.reference_log,
-        parts="; ".join(parts),
-        worst=worst,
+        reference=first.reference_log,
+        clocks="; ".join(_clock_words(clock) for clock in run.clocks),
+        error=worst,
     )
+
+
+def _clock_words(clock: LogClock) -> str:
+    """When a log starts, and how its clock runs."""
+    drift_ppm = clock.drift_ppm or 0.0
+    words = (
+        say(
+            "{log} starts at {offset:.6f} s and its clock runs {drift:.3g} ppm fast",
+            log=clock.log,
+            offset=clock.offset_s,
+            drift=abs(drift_ppm),
+        )
+        if drift_ppm > 0.0
+        else say(
+            "{log} starts at {offset:.6f} s and its clock runs {drift:.3g} ppm slow",
+            log=clock.log,
+            offset=clock.offset_s,
+            drift=abs(drift_ppm),
+        )
+    )
+    if clock.estimate and clock.estimate.inverted:
+        return say("{clock} (its shared channel has the sign turned round)", clock=words)
+    return words
 
 
 def _axis_error(clock: LogClock) -> float | None:
@@ -142,7 +154,7 @@ def _figure(run: RunClocks, clock: LogClock) -> Figure:
         Axis(say("Delay"), "µs"),
         (
             Line(left.times_s[[0, -1]], np.zeros(2), say("even clock"), style="dashed"),
-            Markers(left.times_s, 1e6 * left.delays_s, "delay", errors=1e6 * left.errors_s),
+            Markers(left.times_s, 1e6 * left.delays_s, say("delay"), errors=1e6 * left.errors_s),
         ),
         height=240,
     )

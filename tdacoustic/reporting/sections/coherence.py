@@ -11,17 +11,24 @@ from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.results import Analysis
 
-__all__ = ["coherence", "state_words"]
+__all__ = ["coherence", "state_speed", "state_words"]
 
 LINES: Final = 5
 """Lines of a run whose coherence the report shows; the table has all."""
+
+
+def state_speed(state: ContributionState) -> tuple[str, str] | None:
+    """Speed of an operating state with its unit, of the train or the motor; None where it is not known."""
+    if state.train_speed_km_h is not None:
+        return f"{state.train_speed_km_h:.3g}", "km/h"
+    return None if state.motor_hz is None else (f"{60.0 * state.motor_hz:.4g}", "rpm")
 
 
 def state_words(state: ContributionState) -> str:
     """Speed of an operating state in words; empty where it is not known."""
     if state.train_speed_km_h is not None:
         return f"{state.train_speed_km_h:.3g} km/h"
-    return "" if state.motor_hz is None else say("motor {motor_hz:.4g} rpm", motor_hz=60.0 * state.motor_hz)
+    return "" if state.motor_hz is None else say("motor {speed:.4g} rpm", speed=60.0 * state.motor_hz)
 
 
 def coherence(analysis: Analysis, found: CampaignContributions, receiver: str) -> Section:
@@ -69,7 +76,7 @@ def coherence(analysis: Analysis, found: CampaignContributions, receiver: str) -
         "microphone or a source without a sensor. Where sensors of two components are coherent, one of them hears the "
         "other, and contributions rest on how far the runs tell them apart."
     )
-    blocks: list[Block] = [Paragraph(f"{_coherent_words(found)}{words}")]
+    blocks: list[Block] = [Paragraph(f"{_coherent_words(found)} {words}")]
     if rows:
         title = say("Squared coherence at the loudest lines, {receiver} (95 %)", receiver=receiver)
         table = Table("coherence-lines", title, columns, rows, origin=analysis.campaign.origin)
@@ -84,11 +91,11 @@ def _coherence_words(item: LineCoherence) -> str:
 def _coherent_words(found: CampaignContributions) -> str:
     worst = max(found.result.coherent, key=lambda item: item.coherence, default=None)
     if worst is None:
-        return say("One component alone has sensors, so nothing is coherent with another's. ")
+        return say("One component alone has sensors, so nothing is coherent with another's.")
     state = next(state for state in found.states if state.name == worst.state)
     return say(
         "The most coherent sensors of two components are {first} and {second} in run {run}, "
-        "{coherence:.2f} over its loudest lines. ",
+        "{coherence:.2f} over its loudest lines.",
         first=worst.first,
         second=worst.second,
         run=state.run,

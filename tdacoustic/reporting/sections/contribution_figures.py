@@ -15,7 +15,7 @@ from tdacoustic.contributions import GroupPart, SpanContributions
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.coherence import state_words
-from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, slug
+from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, slug, source_word
 from tdacoustic.tables.contributions import power_db
 
 __all__ = ["Row", "db_words", "over_frequency", "over_speed", "part_words"]
@@ -28,7 +28,10 @@ NO_LOWER_DB: Final = 15.0
 FEW: Final = 12
 """Values of a trace up to which each has its dot."""
 SYMBOLS: Final = {"ok": "circle", "flagged": "x", "refused": "triangle", "below": "triangle"}
-WORDS: Final = {"ok": "", "flagged": mark(", flagged"), "bound": mark(", at most")}
+LEGENDS: Final = {"flagged": mark("{component}, flagged"), "bound": mark("{component}, at most")}
+RANGE: Final = mark("range")
+MEASURED: Final = mark("measured")
+NO_SENSOR: Final = mark("explained by no sensor")
 DRAWN: Final = mark(
     "A dot is known, a cross flagged, a triangle an upper bound of what is refused or does not stand above its "
     "scatter; the bars are the ranges of the table, and those without a lower end are drawn 15 dB down."
@@ -50,14 +53,21 @@ def _range(part: GroupPart) -> str:
 
 def part_words(name: str, part: GroupPart) -> str:
     """Return the part of a component in words: level, verdict and range, or its upper bound."""
+    return f"{source_word(name)} {_level_words(part)}"
+
+
+def _level_words(part: GroupPart) -> str:
     if part.verdict in ("refused", "below"):
-        return say(
-            "{name} {value}at most {db}",
-            name=name,
-            value="refused, " if part.verdict == "refused" else "",
-            db=db_words(part.high),
+        level = db_words(part.high)
+        return (
+            say("refused, at most {level}", level=level)
+            if part.verdict == "refused"
+            else say("at most {level}", level=level)
         )
-    return f"{name} {db_words(part.mean_square)} ({'flagged, ' if part.verdict == 'flagged' else ''}{_range(part)})"
+    level = db_words(part.mean_square)
+    if part.verdict == "flagged":
+        return say("{level} (flagged, {range})", level=level, range=_range(part))
+    return f"{level} ({_range(part)})"
 
 
 def _slot(found: CampaignContributions, name: str) -> int:
@@ -72,9 +82,10 @@ def _measured(x: Array, rows: Sequence[SpanContributions], traces: Sequence[str]
     points = len(rows) <= FEW
     for trace in dict.fromkeys(traces):
         own = np.array([other == trace for other in traces])
-        yield Line(x[own], total[own], "measured", color=7, group="measured", points=points)
+        words = say(MEASURED)
+        yield Line(x[own], total[own], words, color=7, group=words, points=points)
         if np.isfinite(rest[own]).any():
-            words = say("explained by no sensor")
+            words = say(NO_SENSOR)
             yield Line(x[own], rest[own], words, style="dashed", color=3, group=words, points=points)
 
 
@@ -107,7 +118,7 @@ def _part_elements(name: str, x: Array, parts: Sequence[GroupPart], slot: int) -
         level = power_db(part.high if bound else part.mean_square)
         if level is None:
             continue
-        words = f"{name}: {part_words('', part).strip()}"
+        words = f"{source_word(name)}: {_level_words(part)}"
         groups.setdefault("bound" if bound else part.verdict, []).append((float(place), level, words))
         high, low = power_db(part.high), power_db(part.low)
         if not bound and high is not None:
@@ -118,10 +129,10 @@ def _part_elements(name: str, x: Array, parts: Sequence[GroupPart], slot: int) -
             Line(
                 np.array(bars_x),
                 np.array(bars_y),
-                say("{name}: range", name=name),
+                say("{component}: range", component=source_word(name)),
                 color=slot,
                 opacity=0.5,
-                group="range",
+                group=say(RANGE),
             )
         )
     for kind, points in groups.items():
@@ -129,7 +140,7 @@ def _part_elements(name: str, x: Array, parts: Sequence[GroupPart], slot: int) -
             Markers(
                 np.array([p[0] for p in points]),
                 np.array([p[1] for p in points]),
-                f"{name}{say(WORDS[kind])}",
+                say(LEGENDS[kind], component=source_word(name)) if kind in LEGENDS else source_word(name),
                 texts=tuple(p[2] for p in points),
                 symbol=SYMBOLS.get(kind, "triangle"),  # type: ignore[arg-type]
                 color=slot,
@@ -141,7 +152,7 @@ def _part_elements(name: str, x: Array, parts: Sequence[GroupPart], slot: int) -
 def _limits(elements: Iterable[Element]) -> tuple[float, float]:
     """From a little below the lowest point to a little above the highest; bars may run out of it."""
     levels = [e.y for e in elements if isinstance(e, Markers)]
-    levels += [e.y for e in elements if isinstance(e, Line) and not e.name.endswith("range")]
+    levels += [e.y for e in elements if isinstance(e, Line) and e.group != say(RANGE)]
     values = np.concatenate(levels)
     values = values[np.isfinite(values)]
     return (float(values.min()) - 4.0, float(values.max()) + 3.0) if values.size else (0.0, 1.0)
@@ -164,10 +175,11 @@ def over_frequency(found: CampaignContributions, held: Sequence[Row], receiver: 
             continue
         centres = [float(np.sqrt(parts.band_hz[0] * parts.band_hz[1])) for _, parts in rows]
         elements = _elements(found, centres, [parts for _, parts in rows], logarithmic=True)
-        speed = f", {state_words(state)}" if state_words(state) else ""
         name = slug("contributions", receiver, state.name, state.run)
-        title = say("Contributions at {receiver}, run {run}{speed}", receiver=receiver, run=state.run, speed=speed)
-        caption = say("In third octaves. {drawn}", drawn=_drawn([parts for _, parts in rows]))
+        title = say("Contributions at {receiver}, run {run}", receiver=receiver, run=state.run)
+        if state_words(state):
+            title = f"{title}, {state_words(state)}"
+        caption = " ".join([say("In third octaves."), _drawn([parts for _, parts in rows])])
         figures.append(_figure(name, title, caption, Axis(say("Frequency"), "Hz", "log"), elements, 360))
     return figures
 
@@ -192,27 +204,31 @@ def over_speed(
     if any(speed is None for speed in speeds.values()):
         speeds = {state.name: None if state.motor_hz is None else 60.0 * state.motor_hz for state in found.states}
         axis = Axis(say("Motor speed"), "rpm")
-    for kind, what in (("tones", say("the tones")), ("total", say("the whole sound"))):
+    titles = {
+        "tones": say("Contributions to the tones over speed at {receiver}", receiver=receiver),
+        "total": say("Contributions to the whole sound over speed at {receiver}", receiver=receiver),
+    }
+    for kind, title in titles.items():
         rows = [(speed, s, p) for s, span, p in held if span.kind == kind and (speed := speeds[s.name]) is not None]
         rows.sort(key=lambda row: row[0])
         if len({speed for speed, *_ in rows}) < 2:
             continue
         parts = [part for *_, part in rows]
-        traces = [say("steady, {run}", run=modes.get(s.run, "")) if s.steady else s.run for _, s, _ in rows]
+        traces = [f"steady, {modes.get(s.run, '')}" if s.steady else s.run for _, s, _ in rows]
         elements = _elements(found, [speed for speed, *_ in rows], parts, logarithmic=False, traces=traces)
         name = slug(f"contributions-over-speed-{kind}", receiver)
-        title = say("Contributions to {what} over speed at {receiver}", what=what, receiver=receiver)
-        words = (
-            say("Lines join the speeds of one run-up, and steady runs of one mode. ") if len(set(traces)) > 1 else ""
-        )
-        figures.append(_figure(name, title, f"{words}{_drawn(parts)}", axis, elements, 340))
+        joins = [say("Lines join the speeds of one run-up, and steady runs of one mode.")]
+        caption = " ".join([*(joins if len(set(traces)) > 1 else []), _drawn(parts)])
+        figures.append(_figure(name, title, caption, axis, elements, 340))
     return figures
 
 
 def _drawn(rows: Sequence[SpanContributions]) -> str:
     """What the signs mean, and what is left out."""
-    left_out = say(" What no sensor explains is left out where the paths differ from state to state.")
-    return say(DRAWN) + (left_out if any(paths_changed(parts) for parts in rows) else "")
+    if not any(paths_changed(parts) for parts in rows):
+        return say(DRAWN)
+    left_out = say("What no sensor explains is left out where the paths differ from state to state.")
+    return f"{say(DRAWN)} {left_out}"
 
 
 def _figure(name: str, title: str, caption: str, x: Axis, elements: Sequence[Element], height: int) -> Figure:

@@ -10,8 +10,8 @@ from tdacoustic.attribution.contribution_spans import NamedSpan
 from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart, SpanContributions
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.coherence import coherence, state_words
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.coherence import coherence, state_speed, state_words
 from tdacoustic.reporting.sections.contribution_figures import (
     Row,
     db_words,
@@ -20,12 +20,16 @@ from tdacoustic.reporting.sections.contribution_figures import (
     part_words,
 )
 from tdacoustic.reporting.sections.folding import in_sight
-from tdacoustic.reporting.sections.words import joined, pretty_signs, slug
+from tdacoustic.reporting.sections.gear_words import begun_large
+from tdacoustic.reporting.sections.words import joined, pretty_signs, slug, source_word
 from tdacoustic.results import Analysis
 from tdacoustic.tables.contributions import power_db
 
-__all__ = ["agreement_words", "contributions"]
+__all__ = ["contributions"]
 
+SPAN_WORDS: Final = {"total": mark("all"), "tones": mark("tones"), "broadband": mark("broadband")}
+VERDICTS: Final = (mark("flagged"), mark("refused"))
+"""Of parts that a table gives reasons for."""
 IN_SIGHT: Final = 3
 """Runs whose figures stand in sight; those of more are folded away."""
 MOST: Final = 0.5
@@ -81,7 +85,14 @@ def _of_receiver(
         blocks += drawn
     else:
         blocks.append(
-            Details(say("Contributions over frequency, {n_drawn} operating states", n_drawn=len(drawn)), drawn)
+            Details(
+                say_count(
+                    "Contributions over frequency, {count} operating state",
+                    "Contributions over frequency, {count} operating states",
+                    len(drawn),
+                ),
+                drawn,
+            )
         )
     whole = [row for row in held if row[1].kind in ("total", "tones", "broadband")]
     single = [row for row in held if row[1].kind in ("order", "tone")]
@@ -92,7 +103,10 @@ def _of_receiver(
     if single:
         title = say("Contributions at {receiver}, tone by tone", receiver=receiver)
         table = _table(analysis, found, single, slug("contributions-of-tones", receiver), title)
-        blocks.append(Details(say("Tone by tone and order by order, {n_single} rows", n_single=len(single)), [table]))
+        folded = say_count(
+            "Tone by tone and order by order, {count} row", "Tone by tone and order by order, {count} rows", len(single)
+        )
+        blocks.append(Details(folded, [table]))
     return [*blocks, *_reasons(held, receiver)]
 
 
@@ -107,125 +121,117 @@ def _answer(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row
         held = [row for row in rows if row[0].run == run and row[2].receiver == receiver]
         if held:
             sentences.append(pretty_signs(_sentence(held, several=len(runs) > len(analysis.campaign.conditions()))))
-    words = say(
-        "At {receiver}, by the paths of {n_states} operating states together",
-        receiver=receiver,
-        n_states=len(found.states),
-    )
+    low, high = next(parts.band_hz for _, span, parts in rows if span.kind == "total" and parts.receiver == receiver)
     if len(found.states) == 1:
         words = say(
-            "At {receiver}, from a single operating state, which cannot tell cross-talk from a source",
+            "At {receiver}, from a single operating state, which cannot tell cross-talk from a source, "
+            "{low:.4g} to {high:.4g} Hz:",
             receiver=receiver,
+            low=low,
+            high=high,
         )
-    low, high = next(parts.band_hz for _, span, parts in rows if span.kind == "total" and parts.receiver == receiver)
-    return [
-        Paragraph(say("{words}, {low:.4g} to {high:.4g} Hz:", words=words, low=low, high=high)),
-        Sentences(sentences),
-    ]
+    else:
+        words = say(
+            "At {receiver}, by the paths of {count} operating states together, {low:.4g} to {high:.4g} Hz:",
+            receiver=receiver,
+            count=len(found.states),
+            low=low,
+            high=high,
+        )
+    return [Paragraph(words), Sentences(sentences)]
 
 
 def _sentence(held: Sequence[Row], several: bool) -> str:
     state = held[0][0]
-    what = say("Condition {condition}", condition=state.condition) + (
-        say(", run {run}", run=state.run) if several else ""
+    what = (
+        say("Condition {condition}, run {run}", condition=state.condition, run=state.run)
+        if several
+        else say("Condition {condition}", condition=state.condition)
     )
     if not state.steady:
-        return f"{what}, {_run_up_words(held)}"
-    speed = f" ({state_words(state)})" if state_words(state) else ""
+        return f"{what}, {_run_up_words(held)}."
+    if state_words(state):
+        what = f"{what} ({state_words(state)})"
     by_kind = {span.kind: parts for _, span, parts in held if span.kind in ("total", "tones", "broadband")}
     total, tones = by_kind["total"], by_kind.get("tones")
-    said = f"{what}{speed}: "
-    if tones is not None:
-        told = joined([part_words(name, part) for name, part in tones.groups.items()])
-        said += say(
-            "of the tones' {db}: {told}; {unexplained}. ",
-            db=db_words(tones.total),
-            told=told,
-            unexplained=_unexplained(tones),
-        )
-        said += say("Of all {db} ", db=db_words(total.total))
-    else:
-        told = joined([part_words(name, part) for name, part in total.groups.items()])
-        said += say("of {db}: {told}; ", db=db_words(total.total), told=told)
-    return said + f"{_unexplained(total)}."
+    told = total if tones is None else tones
+    parts = joined([part_words(name, part) for name, part in told.groups.items()])
+    if tones is None:
+        said = say("of {level}: {parts}; {rest}.", level=db_words(total.total), parts=parts, rest=_rest_words(total))
+        return f"{what}: {said}"
+    said = say(
+        "of the tones' {level}: {parts}; {rest}.", level=db_words(tones.total), parts=parts, rest=_rest_words(tones)
+    )
+    return f"{what}: {said} {_whole_words(total)}"
 
 
-def _unexplained(parts: SpanContributions) -> str:
+def _rest_words(parts: SpanContributions) -> str:
+    """How much no sensor explains, as a clause."""
     if paths_changed(parts):
         return say("the paths differ from state to state, so what no sensor explains is not known")
-    share = 100.0 * parts.residual / parts.total if parts.total > 0.0 else 0.0
-    return say("no sensor explains {db}", db=db_words(parts.residual)) + (
-        f" ({min(share, 100.0):.0f} %)" if share >= 50.0 else ""
-    )
+    return say("no sensor explains {level}", level=_rest_level(parts))
+
+
+def _whole_words(parts: SpanContributions) -> str:
+    """How much of the whole sound no sensor explains, as a sentence."""
+    level = db_words(parts.total)
+    if paths_changed(parts):
+        return say(
+            "Of all {level} the paths differ from state to state, so what no sensor explains is not known.", level=level
+        )
+    return say("Of all {level} no sensor explains {rest}.", level=level, rest=_rest_level(parts))
+
+
+def _rest_level(parts: SpanContributions) -> str:
+    share = parts.residual / parts.total if parts.total > 0.0 else 0.0
+    level = db_words(parts.residual)
+    return f"{level} ({min(100.0 * share, 100.0):.0f} %)" if 100.0 * share >= 50.0 else level
 
 
 def _run_up_words(held: Sequence[Row]) -> str:
     """Of a run-up: how often each component's part of the whole is known, and from where to where it goes."""
     rows = [(state, parts) for state, span, parts in held if span.kind == "total"]
-    speeds = [words.removeprefix("motor ") for state, _ in rows if (words := state_words(state))]
-    said = []
-    for name in rows[0][1].groups:
-        levels = [power_db(p.groups[name].mean_square) for _, p in rows if p.groups[name].verdict == "ok"]
-        known = [level for level in levels if level is not None]
-        if known:
-            said.append(
-                say(
-                    "{name} {known:.1f} to {known_2:.1f} dB, known at {n_known} of {n_rows} speeds",
-                    name=name,
-                    known=min(known),
-                    known_2=max(known),
-                    n_known=len(known),
-                    n_rows=len(rows),
-                )
-            )
-    known_any = bool(said)
-    said = said or [say("no component's part is known at any of {n_rows} speeds", n_rows=len(rows))]
+    speeds = [speed for state, _ in rows if (speed := state_speed(state)) is not None]
+    known = [words for name in rows[0][1].groups if (words := _known_words(name, [parts for _, parts in rows]))]
+    said = (
+        say("of the whole sound {parts}", parts=joined(known))
+        if known
+        else say("no component's part is known at any of {count} speeds", count=len(rows))
+    )
+    clauses = [said]
     most = sum(p.residual > MOST * p.total and not paths_changed(p) for _, p in rows)
-    end = say("; most of the sound is explained by no sensor at {most} of them", most=most) if most else ""
+    if most:
+        clauses.append(say("most of the sound is explained by no sensor at {count} of them", count=most))
     differ = sum(paths_changed(p) for _, p in rows)
     if differ:
-        end += say(
-            "; what no sensor explains is not known at {differ}, for the paths differ from state to state",
-            differ=differ,
+        clauses.append(
+            say(
+                "what no sensor explains is not known at {count}, for the paths differ from state to state",
+                count=differ,
+            )
         )
-    ends = say(" from {split} to {speeds}", split=speeds[0].split()[0], speeds=speeds[-1]) if speeds else ""
-    return say(
-        "a run-up{ends}: {value}{said}{end}.",
-        ends=ends,
-        value=say("of the whole sound ") if known_any else "",
-        said=joined(said),
-        end=end,
+    what = (
+        say("a run-up from {first} to {last}", first=speeds[0][0], last=" ".join(speeds[-1]))
+        if speeds
+        else say("a run-up")
     )
+    return f"{what}: {'; '.join(clauses)}"
 
 
-def agreement_words(analysis: Analysis, condition: str) -> str:
-    """Return whether the kinds of evidence on a condition agree, as one sentence; empty where there is nothing to say.
-
-    Parameters
-    ----------
-    analysis : Analysis
-    condition : str
-    """
-    found = analysis.agreements.get(condition)
-    if found is None:
+def _known_words(name: str, rows: Sequence[SpanContributions]) -> str:
+    """Levels between which a component's part is known; empty where it is nowhere."""
+    levels = [power_db(parts.groups[name].mean_square) for parts in rows if parts.groups[name].verdict == "ok"]
+    known = [level for level in levels if level is not None]
+    if not known:
         return ""
-    quiet = "contribution" in found.agreement.silent
-    doubt = (
-        say("contributions: {contribution_words}", contribution_words=found.contribution_words)
-        if quiet and found.contribution_words
-        else ""
+    return say(
+        "{component} {lowest:.1f} to {highest:.1f} dB, known at {count} of {all} speeds",
+        component=source_word(name),
+        lowest=min(known),
+        highest=max(known),
+        count=len(known),
+        all=len(rows),
     )
-    if found.agreement.word == "silent":
-        return f"{doubt[0].upper()}{doubt[1:]}." if doubt else ""
-    by_source: dict[str, list[str]] = {}
-    for kind, (source, _) in found.agreement.leads.items():
-        by_source.setdefault(source, []).append(f"{kind}s")
-    said = [say("{kinds} say {source}", kinds=joined(kinds), source=source) for source, kinds in by_source.items()]
-    silent = [f"{kind}s" for kind in found.agreement.silent if kind != "contribution"]
-    said += [say("{silent} name no source", silent=joined(silent))] if silent else []
-    said += [doubt] if doubt else []
-    opening = {"agree": say("The kinds of evidence agree"), "disagree": say("The kinds of evidence disagree")}
-    return f"{opening.get(found.agreement.word, say('One kind of evidence alone'))}: {'; '.join(said)}."
 
 
 # ---------------------------------------------------------------- tables
@@ -238,7 +244,7 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
         Column("span", say("Sound")),
         Column("total_db", say("Measured"), "dB", 1, "number"),
         Column("residual_db", say("No sensor"), "dB", 1, "number"),
-        *(Column(f"{slug(component)}_db", component.capitalize(), "dB") for component in found.components),
+        *(Column(f"{slug(component)}_db", begun_large(source_word(component)), "dB") for component in found.components),
     ]
     cells = [
         [
@@ -265,11 +271,13 @@ def _cell(part: GroupPart) -> str:
     reach = bound if low is None or high is None else say("{low:.1f} to {high:.1f}", low=low, high=high)
     level = power_db(part.mean_square)
     said = "" if level is None else f"{level:.1f}"
-    return say("{said} flagged, {reach}", said=said, reach=reach) if part.verdict == "flagged" else f"{said} ({reach})"
+    if part.verdict != "flagged":
+        return f"{said} ({reach})"
+    return say("{level} flagged, {range}", level=said, range=reach) if said else say("flagged, {range}", range=reach)
 
 
 def _span_words(span: NamedSpan) -> str:
-    return {"total": "all", "tones": "tones", "broadband": "broadband"}.get(span.kind, span.span.name)
+    return say(SPAN_WORDS[span.kind]) if span.kind in SPAN_WORDS else span.span.name
 
 
 def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
@@ -277,7 +285,7 @@ def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
     where: dict[tuple[str, str, str], list[str]] = {}
     for state, span, parts in held:
         for name, part in parts.groups.items():
-            if part.verdict in ("flagged", "refused") and span.kind != "band":
+            if part.verdict in VERDICTS and span.kind != "band":
                 reason = part.reason.split(":")[0]
                 where.setdefault((name, part.verdict, reason), []).append(
                     say("run {run} {span}", run=state.run, span=_span_words(span))
@@ -292,8 +300,19 @@ def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
         Column("where", say("Where")),
     )
     rows = [
-        (name, verdict, reason, len(places), f"{', '.join(places[:4])}{', ...' if len(places) > 4 else ''}")
+        (
+            source_word(name),
+            verdict,
+            reason,
+            len(places),
+            f"{', '.join(places[:4])}{', ...' if len(places) > 4 else ''}",
+        )
         for (name, verdict, reason), places in where.items()
     ]
     table = Table(slug("contribution-reasons", receiver), say("Why parts are flagged or refused"), columns, rows)
-    return [Details(say("Why parts are flagged or refused, {n_rows} reasons", n_rows=len(rows)), [table])]
+    folded = say_count(
+        "Why parts are flagged or refused, {count} reason",
+        "Why parts are flagged or refused, {count} reasons",
+        len(rows),
+    )
+    return [Details(folded, [table])]

@@ -20,13 +20,13 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, LineStyle, Rule
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, hertz
-from tdacoustic.reporting.sections.words import joined, pretty_signs
+from tdacoustic.reporting.sections.gear_words import DIRECTION_SLOTS, gear_word, hertz, named_conditions
+from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["coupling_section"]
 
-WORDS: Final = {"one_way": "one-way", "two_way": "two-way"}
+WORDS: Final = {"one_way": mark("one-way"), "two_way": mark("two-way")}
 STYLES: Final[dict[str, LineStyle]] = {"one_way": "dashed", "two_way": "solid"}
 
 SMALLEST_DB: Final = 0.05
@@ -35,9 +35,12 @@ SMALLEST_DB: Final = 0.05
 METHOD = mark(
     "One-way coupling takes the bearing forces on seats that do not move and applies them to the housing. In two-way "
     "coupling the seats give way: the housing's modes enter the receptance that the mesh feels and the force that a "
-    "bearing carries, and that force acts on the housing. All other numbers of this report are {used} ([model] "
-    'coupling = "{key}").'
+    "bearing carries, and that force acts on the housing."
 )
+USED: Final = {
+    "one_way": mark('All other numbers of this report are one-way ([model] coupling = "one_way").'),
+    "two_way": mark('All other numbers of this report are two-way ([model] coupling = "two_way").'),
+}
 CURVES = mark(
     "Curves are for teeth in contact at the mean stiffness of the mesh, per µm of transmission error (amplitude): "
     "linear in it, so they hold for any."
@@ -66,9 +69,9 @@ def coupling_section(result: FleetPrediction) -> Section | None:
     if coupling is None:
         return None
     differences = coupling.curves.differences(*_range(coupling))
-    beyond = say(BEYOND).format(highest=hertz(coupling.highest_hz), loss=CORRECTION_LOSS)
+    beyond = say(BEYOND, highest=hertz(coupling.highest_hz), loss=CORRECTION_LOSS)
     blocks: list[Block] = [
-        Paragraph(say(METHOD).format(used=WORDS[coupling.used], key=coupling.used)),
+        Paragraph(f"{say(METHOD)} {say(USED[coupling.used])}"),
         Sentences(_said(coupling, differences)),
         FigureBlock(_receptance(coupling), "calculated"),
         *(FigureBlock(_differences(coupling, gear), "calculated") for gear in range(len(GEARS))),
@@ -105,22 +108,17 @@ def _said(coupling: Coupling, differences: tuple[ForceDifference, ...]) -> list[
     medians = [found.median_db for found in differences]
     said = [
         say(
-            "Between {hertz} and {hertz_2} the bearing forces with two-way coupling differ from the "
-            "one-way ones by {decibels} (at {hertz_3}, {gear} {direction}) to {decibels_2} (at "
-            "{hertz_4}, {gear_2} {direction_2}). At half of the frequencies they differ by more than "
-            "{medians:.1f} to {medians_2:.1f} dB, depending on gear and direction.",
-            hertz=hertz(low),
-            hertz_2=hertz(high),
-            decibels=_decibels(least.lowest[0]),
-            hertz_3=hertz(least.lowest[1]),
-            gear=least.gear,
-            direction=least.direction,
-            decibels_2=_decibels(most.highest[0]),
-            hertz_4=hertz(most.highest[1]),
-            gear_2=most.gear,
-            direction_2=most.direction,
-            medians=min(medians),
-            medians_2=max(medians),
+            "Between {from_frequency} and {to_frequency} the bearing forces with two-way coupling differ from the "
+            "one-way ones by {lowest} (at {lowest_at}) to {highest} (at {highest_at}). At half of the frequencies they "
+            "differ by more than {least:.1f} to {most:.1f} dB, depending on gear and direction.",
+            from_frequency=hertz(low),
+            to_frequency=hertz(high),
+            lowest=_decibels(least.lowest[0]),
+            lowest_at=f"{hertz(least.lowest[1])}, {gear_word(least.gear)} {least.direction}",
+            highest=_decibels(most.highest[0]),
+            highest_at=f"{hertz(most.highest[1])}, {gear_word(most.gear)} {most.direction}",
+            least=min(medians),
+            most=max(medians),
         )
     ]
     said += [_change_words(say("The housing's own sound at 4 m"), coupling, "structure_db")]
@@ -135,53 +133,48 @@ def _change_words(what: str, coupling: Coupling, name: str) -> str:
     if not held:
         return ""
     (least, one), (most, other) = min(held, key=lambda p: p[0]), max(held, key=lambda p: p[0])
+    values: dict[str, object] = {"level": what, "name": one.condition, "smallest": SMALLEST_DB}
     if max(abs(least), abs(most)) < SMALLEST_DB:
-        where = say(" in condition {condition}", condition=one.condition) if len(held) == 1 else ""
-        return say(
-            "{what} does not change{where} with two-way coupling (less than {smallest_db:g} dB).",
-            what=what,
-            where=where,
-            smallest_db=SMALLEST_DB,
-        )
+        if len(held) == 1:
+            return say(
+                "{level} does not change in condition {name} with two-way coupling (less than {smallest:g} dB).",
+                **values,
+            )
+        return say("{level} does not change with two-way coupling (less than {smallest:g} dB).", **values)
     if len(held) == 1:
         return say(
-            "{what} changes by {decibels} in condition {condition} with two-way coupling.",
-            what=what,
-            decibels=_decibels(least),
-            condition=one.condition,
+            "{level} changes by {change} in condition {name} with two-way coupling.", change=_decibels(least), **values
         )
     return say(
-        "{what} changes by {decibels} (condition {condition}) to {decibels_2} (condition "
-        "{condition_2}) with two-way coupling.",
-        what=what,
-        decibels=_decibels(least),
-        condition=one.condition,
-        decibels_2=_decibels(most),
-        condition_2=other.condition,
+        "{level} changes by {least} (condition {name}) to {most} (condition {other}) with two-way coupling.",
+        least=_decibels(least),
+        most=_decibels(most),
+        other=other.condition,
+        **values,
     )
 
 
 def _swing_words(coupling: Coupling) -> str:
     held = [(two / one - 1.0, c) for c in coupling.conditions for one, two in [c.dte_pp_m] if one and two]
     missing = [c.condition for c in coupling.conditions if None in c.dte_pp_m]
-    text = ""
+    said = []
     if held:
         most, where = max(held, key=lambda pair: abs(pair[0]))
-        text = pretty_signs(
+        text = say(
+            "The dynamic transmission error changes most in condition {name}, by {change:+.1f} %.",
+            name=where.condition,
+            change=100.0 * most,
+        )
+        said.append(pretty_signs(text))
+    if missing:
+        said.append(
             say(
-                "The dynamic transmission error changes most in condition {condition}, by {most:+.1f} %.",
-                condition=where.condition,
-                most=100.0 * most,
+                "In {conditions} the balance finds no stable motion with the other coupling, which is not integrated "
+                "in time.",
+                conditions=named_conditions(missing),
             )
         )
-    if missing:
-        text += say(
-            " In condition{value} {missing} the balance finds no stable motion with the other "
-            "coupling, which is not integrated in time.",
-            value="s" if len(missing) > 1 else "",
-            missing=joined(missing),
-        )
-    return text.strip()
+    return " ".join(said)
 
 
 def _rules(coupling: Coupling) -> list[Element]:
@@ -196,7 +189,7 @@ def _axis(coupling: Coupling) -> Axis:
 def _receptance(coupling: Coupling) -> Figure:
     curves = coupling.curves
     lines: list[Element] = [
-        Line(curves.frequency_hz, curves.receptance_m_per_n[kind], WORDS[name], STYLES[name], color=kind)
+        Line(curves.frequency_hz, curves.receptance_m_per_n[kind], say(WORDS[name]), STYLES[name], color=kind)
         for kind, name in enumerate(COUPLINGS)
     ]
     return Figure(
@@ -222,7 +215,7 @@ def _differences(coupling: Coupling, gear: int) -> Figure:
     ]
     return Figure(
         f"coupling-{GEARS[gear]}",
-        say("Forces on the bearings of the {gears}: two-way less one-way", gears=GEARS[gear]),
+        say("Forces on the bearings of the {gear}: two-way less one-way", gear=gear_word(GEARS[gear])),
         say(
             "Teeth in contact at the mean stiffness of the mesh; above 0 the housing that gives way raises the force. "
             "Vertical lines: the mesh frequencies of the conditions."
@@ -240,7 +233,7 @@ def _forces(coupling: Coupling, gear: int) -> Figure:
         Line(
             curves.frequency_hz,
             curves.bearing_force_n_per_um[kind, gear, d],
-            f"{direction}, {WORDS[name]}",
+            f"{direction}, {say(WORDS[name])}",
             STYLES[name],
             color=DIRECTION_SLOTS[direction],
         )
@@ -249,7 +242,7 @@ def _forces(coupling: Coupling, gear: int) -> Figure:
     ]
     return Figure(
         f"coupling-forces-{GEARS[gear]}",
-        say("Forces on the bearings of the {gears} per µm of transmission error", gears=GEARS[gear]),
+        say("Forces on the bearings of the {gear} per µm of transmission error", gear=gear_word(GEARS[gear])),
         say(
             "Teeth in contact at the mean stiffness of the mesh. Vertical lines: the mesh frequencies of the "
             "conditions."
@@ -263,7 +256,8 @@ def _forces(coupling: Coupling, gear: int) -> Figure:
 
 def _by_direction(coupling: Coupling, differences: tuple[ForceDifference, ...]) -> Table:
     rows: list[list[Cell]] = [
-        [found.gear, found.direction, found.median_db, *found.lowest, *found.highest] for found in differences
+        [gear_word(found.gear), found.direction, found.median_db, *found.lowest, *found.highest]
+        for found in differences
     ]
     low, high = _range(coupling)
     columns = (
@@ -271,12 +265,12 @@ def _by_direction(coupling: Coupling, differences: tuple[ForceDifference, ...]) 
         Column("direction", say("Direction")),
         Column("median_db", say("Median"), say("dB, magnitude"), 1, "number"),
         Column("lowest_db", say("Lowest"), "dB", 1, "number"),
-        Column("lowest_hz", "at", "Hz", 0, "number"),
+        Column("lowest_hz", say("at"), "Hz", 0, "number"),
         Column("highest_db", say("Highest"), "dB", 1, "number"),
-        Column("highest_hz", "at", "Hz", 0, "number"),
+        Column("highest_hz", say("at"), "Hz", 0, "number"),
     )
     caption = say(
-        "Bearing forces, two-way less one-way, between {hertz} and {hertz_2}", hertz=hertz(low), hertz_2=hertz(high)
+        "Bearing forces, two-way less one-way, between {lowest} and {highest}", lowest=hertz(low), highest=hertz(high)
     )
     return Table("coupling-directions", caption, columns, rows, origin="calculated")
 
@@ -288,7 +282,9 @@ def _by_condition(coupling: Coupling) -> Table:
         ("structure", say("Structure"), "dB", 1),
         ("total", say("Total"), "dB", 1),
     ):
-        columns += [Column(f"{key}_{kind}", title, f"{unit}, {WORDS[kind]}", digits, "number") for kind in COUPLINGS]
+        columns += [
+            Column(f"{key}_{kind}", title, f"{unit}, {say(WORDS[kind])}", digits, "number") for kind in COUPLINGS
+        ]
     rows = [_condition_cells(held) for held in coupling.conditions]
     return Table(
         "coupling-conditions",

@@ -18,7 +18,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure, Markers
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.design_study_words import (
     left_out_words,
     level_words,
@@ -92,8 +92,8 @@ def _ranges(result: FleetPrediction, study: SweepSensitivity, name: str) -> Tabl
             f"{value_words(key, end)}{unit if unit == '°' else f' {unit}'}".rstrip() for end in (held.low, held.high)
         ]
         spread = say("each ratio as likely") if held.scale == "log" else say("each as likely")
-        whole = say(", whole numbers alone") if key in study.found.whole else ""
-        rows.append([number_words(key, result.fleet), *ends, f"{spread}{whole}", key])
+        whole = [say("whole numbers alone")] if key in study.found.whole else []
+        rows.append([number_words(key, result.fleet), *ends, ", ".join([spread, *whole]), key])
     return Table(f"{name}-ranges", say("Parameters and ranges"), columns, rows)
 
 
@@ -102,9 +102,10 @@ def _names(result: FleetPrediction, study: SweepSensitivity) -> tuple[list[int],
     return places, [number_words(study.keys[place], result.fleet) for place in places]
 
 
-def _some(study: SweepSensitivity) -> str:
+def _some(study: SweepSensitivity) -> list[str]:
+    """How many parameters are drawn, where not all are."""
     n = len(study.keys)
-    return say(" The first {most_bars} of {n} parameters are drawn.", most_bars=MOST_BARS, n=n) if n > MOST_BARS else ""
+    return [say("The first {shown} of {held} parameters are drawn.", shown=MOST_BARS, held=n)] if n > MOST_BARS else []
 
 
 def _bars(names: list[str], places: list[int], held: Estimate | None, name: str) -> Bars:
@@ -121,17 +122,18 @@ def _indices(result: FleetPrediction, study: SweepSensitivity, level: LevelInStu
         _bars(names, places, level.first_order, say("on its own (first order)")),
         _bars(names, places, level.total, say("with interactions (total)")),
     ]
-    caption = say(
-        "Of the {level} at {surface}; lines are intervals of 95 %. An index below 0 is one of 0 "
-        "from too few points.{some}",
-        level=level_words(level),
-        surface=result.prediction.surface,
-        some=_some(study),
-    )
+    caption = [
+        say(
+            "Of the {level} at {surface}; lines are intervals of 95 %. An index below 0 is one of 0 from "
+            "too few points.",
+            level=level_words(level),
+            surface=result.prediction.surface,
+        ),
+        *_some(study),
+    ]
     title = say("Part of the level's variance that each parameter makes")
-    return Figure(
-        f"{name}-indices", title, caption, Axis(say("Parameter")), Axis(say("Part of the variance")), bars, height=460
-    )
+    axes = Axis(say("Parameter")), Axis(say("Part of the variance"))
+    return Figure(f"{name}-indices", title, " ".join(caption), *axes, bars, height=460)
 
 
 def _by_condition(result: FleetPrediction, study: SweepSensitivity, name: str) -> Figure:
@@ -148,26 +150,16 @@ def _by_condition(result: FleetPrediction, study: SweepSensitivity, name: str) -
         for level in shown
     ]
     variance = any(level.total is not None for level in shown)
-    what = say("Total index") if variance else say("Standardised regression coefficient")
-    some = (
-        say(
-            " {most_levels} of {n_conditions} conditions are drawn.",
-            most_levels=MOST_LEVELS,
-            n_conditions=len(conditions),
-        )
-        if len(conditions) > MOST_LEVELS
-        else ""
-    )
-    caption = say(
-        "At {surface}; lines are intervals of 95 %.{some}{some_2}",
-        surface=result.prediction.surface,
-        some=some,
-        some_2=_some(study),
-    )
+    caption = [say("At {surface}; lines are intervals of 95 %.", surface=result.prediction.surface)]
+    if len(conditions) > MOST_LEVELS:
+        caption.append(say("{shown} of {held} conditions are drawn.", shown=MOST_LEVELS, held=len(conditions)))
+    if variance:
+        what, title = say("Total index"), say("Total index of each parameter by condition")
+    else:
+        what = say("Standardised regression coefficient")
+        title = say("Standardised regression coefficient of each parameter by condition")
     axes = Axis(say("Parameter")), Axis(what)
-    return Figure(
-        f"{name}-conditions", say("{what} of each parameter by condition", what=what), caption, *axes, bars, height=460
-    )
+    return Figure(f"{name}-conditions", title, " ".join([*caption, *_some(study)]), *axes, bars, height=460)
 
 
 def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStudy, place: int, name: str) -> Figure:
@@ -179,22 +171,32 @@ def _scatter(result: FleetPrediction, study: SweepSensitivity, level: LevelInStu
     values = np.array([study.found.points[number][place][1] for number in some.tolist()], dtype=float)
     words = number_words(key, result.fleet)
     drawn = (
-        say("{n_some} of {n_there} points", n_some=len(some), n_there=len(there))
+        say("{shown} of {held} points", shown=len(some), held=len(there))
         if len(some) < len(there)
-        else say("{n_some} points", n_some=len(some))
+        else say_count("{count} point", "{count} points", len(some))
     )
     return Figure(
         slug(name, "over", key),
-        say("Level over {words}", words=words),
-        say(
-            "{capitalize} at {surface}, all other parameters anywhere in their ranges; {drawn}.",
-            capitalize=level_words(level).capitalize(),
-            surface=result.prediction.surface,
-            drawn=drawn,
-        ),
+        say("Level over {parameter}", parameter=words),
+        _scatter_caption(level, result.prediction.surface, drawn),
         Axis(f"{words[:1].upper()}{words[1:]}", unit_of(key), held.scale),
         Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
         [Markers(values, level.level_db[some], level_words(level))],
+    )
+
+
+def _scatter_caption(level: LevelInStudy, surface: str, points: str) -> str:
+    if level.condition is None:
+        return say(
+            "Energy mean over the conditions at {surface}, all other parameters anywhere in their ranges; {points}.",
+            surface=surface,
+            points=points,
+        )
+    return say(
+        "Level in condition {condition} at {surface}, all other parameters anywhere in their ranges; {points}.",
+        condition=level.condition,
+        surface=surface,
+        points=points,
     )
 
 
@@ -208,9 +210,10 @@ def _table(result: FleetPrediction, study: SweepSensitivity, name: str) -> Table
     }
     columns = [Column("parameter", say("Parameter")), Column("level", say("Level"))]
     for measure, (title, unit, digits) in titles.items():
-        for end, of in (("", ""), ("_low", say(", from")), ("_high", say(", to"))):
-            columns.append(Column(f"{measure}{end}", f"{title}{of}", unit, digits, "number"))
-    columns.append(Column("explained", say("R²"), "", 2, "number"))
+        columns.append(Column(measure, title, unit, digits, "number"))
+        columns.append(Column(f"{measure}_low", say("{index}, from", index=title), unit, digits, "number"))
+        columns.append(Column(f"{measure}_high", say("{index}, to", index=title), unit, digits, "number"))
+    columns.append(Column("explained", "R²", "", 2, "number"))
     rows: list[list[Cell]] = []
     for place in study.ranking():
         words = number_words(study.keys[place], result.fleet)

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from tdacoustic.fleet import Fleet
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.studies import LevelInStudy, SweepSensitivity
@@ -30,29 +30,33 @@ def method_words(study: SweepSensitivity) -> str:
     """Return what was computed and how the numbers come from it."""
     sweep = study.found.sweep
     n = len(study.found.points)
-    interval = say("Intervals hold {confidence:g} %, from resampled rows", confidence=100.0 * CONFIDENCE)
-    stated = "" if sweep.seed is not None else say(", made of the ranges")
-    seed = say("the seed is {seed_of}{stated}", seed_of=seed_of(sweep), stated=stated)
+    seed = (
+        say("the seed is {seed}, made of the ranges", seed=seed_of(sweep))
+        if sweep.seed is None
+        else say("the seed is {seed}", seed=seed_of(sweep))
+    )
+    confidence = 100.0 * CONFIDENCE
     if sweep.sampling == "saltelli":
         return say(
-            "{n} points by Saltelli's design of {base_points} base points; {seed}. The "
+            "{points} points by Saltelli's design of {base_points} base points; {seed}. The "
             "first-order index is the part of the level's variance that goes when a parameter is "
             "known, the total index the part that stays when all others are known: what lies "
-            "between is interaction. {interval}.",
-            n=n,
+            "between is interaction. Intervals hold {confidence:g} %, from resampled rows.",
+            points=n,
             base_points=sweep.base_points,
             seed=seed,
-            interval=interval,
+            confidence=confidence,
         )
     return say(
-        "{n} points of a Latin hypercube, in cubes of up to 100 points each; {seed}. A "
+        "{points} points of a Latin hypercube, in cubes of up to 100 points each; {seed}. A "
         "standardised regression coefficient says by how many of its standard deviations the "
         "level moves with one of the parameter, along a straight line; R² says how much of the "
         'variance that line has. Interaction is no part of it: sampling = "saltelli" tells it. '
-        "{interval} as if they were independent, which makes them rather too wide here.",
-        n=n,
+        "Intervals hold {confidence:g} %, from resampled rows as if they were independent, which makes them rather "
+        "too wide here.",
+        points=n,
         seed=seed,
-        interval=interval,
+        confidence=confidence,
     )
 
 
@@ -62,19 +66,24 @@ def left_out_words(study: SweepSensitivity) -> str:
     for level in study.levels:
         if level.condition is None:
             continue
-        reasons = {"rattle": level.n_rattling, "make no sound": level.n_silent}
-        words = [f"{number} {why}" for why, number in reasons.items() if number]
+        words = []
+        if level.n_rattling:
+            words.append(say_count("{count} rattles", "{count} rattle", level.n_rattling))
+        if level.n_silent:
+            words.append(say_count("{count} makes no sound", "{count} make no sound", level.n_silent))
         if words:
-            told.append(say("in condition {condition} {words}", condition=level.condition, words=joined(words)))
+            told.append(say("in condition {condition} {points}", condition=level.condition, points=joined(words)))
     if not told:
         return ""
-    of = len(study.found.points)
-    return say(
-        "Of {of} points {told}. Where the harmonic balance finds no stable motion a study "
+    return say_count(
+        "Of {count} point {conditions}. Where the harmonic balance finds no stable motion a study "
         "integrates none in time, which takes seconds each (a grid does): these points are left "
         "out; what is said holds for the others.",
-        of=of,
-        told=joined(told),
+        "Of {count} points {conditions}. Where the harmonic balance finds no stable motion a study "
+        "integrates none in time, which takes seconds each (a grid does): these points are left "
+        "out; what is said holds for the others.",
+        len(study.found.points),
+        conditions=joined(told),
     )
 
 
@@ -87,27 +96,27 @@ def study_words(fleet: Fleet, study: SweepSensitivity) -> list[str]:
     if level.weights is None:
         least = max(FEWEST_ROWS, 3 * len(study.keys))
         rows = (
-            say("{fewest_rows} base points", fewest_rows=FEWEST_ROWS)
+            say_count("{count} base point", "{count} base points", FEWEST_ROWS)
             if study.found.sweep.sampling == "saltelli"
-            else say("{least} points", least=least)
+            else say_count("{count} point", "{count} points", least)
         )
         return [
             say(
-                "Nothing can be said of the {name}: it does not vary, or fewer than {rows} have it.",
-                name=name,
-                rows=rows,
+                "Nothing can be said of the {level}: it does not vary, or fewer than {points} have it.",
+                level=name,
+                points=rows,
             )
         ]
     held = level.level_db[np.isfinite(level.level_db)]
     low, middle, high = np.percentile(held, [5.0, 50.0, 95.0])
     said = [
         say(
-            "The {name} lies between {low:.1f} and {high:.1f} dB at 90 % of the points, with a "
-            "median of {middle:.1f} dB.",
-            name=name,
+            "The {level} lies between {low:.1f} and {high:.1f} dB at 90 % of the points, with a "
+            "median of {median:.1f} dB.",
+            level=name,
             low=low,
             high=high,
-            middle=middle,
+            median=middle,
         )
     ]
     said += _of_variance(fleet, study, level) if level.total is not None else _of_line(fleet, study, level)
@@ -129,30 +138,28 @@ def _of_variance(fleet: Fleet, study: SweepSensitivity, level: LevelInStudy) -> 
     counting = [place for place in study.ranking() if total.value[place] >= COUNTS]
     named = [
         say(
-            "{number} with {percent} of its variance ({percent_2} to {percent_3})",
-            number=number_words(study.keys[place], fleet),
-            percent=_percent(total.value[place]),
-            percent_2=_percent(total.low[place]),
-            percent_3=_percent(total.high[place]),
+            "{parameter} with {share} of its variance ({low} to {high})",
+            parameter=number_words(study.keys[place], fleet),
+            share=_percent(total.value[place]),
+            low=_percent(total.low[place]),
+            high=_percent(total.high[place]),
         )
         for place in counting[:MOST_NAMED]
     ]
-    said = [say("It is decided by {named}, interactions with others included.", named=joined(named))]
+    said = [say("It is decided by {parameters}, interactions with others included.", parameters=joined(named))]
     alone = float(np.clip(own.value.sum(), 0.0, 1.0))
     said.append(
         say(
-            "Parameters on their own make about {percent} of the variance, interactions the rest.",
-            percent=_percent(alone),
+            "Parameters on their own make about {share} of the variance, interactions the rest.",
+            share=_percent(alone),
         )
     )
     acting = [number_words(study.keys[place], fleet) for place in counting if total.low[place] > own.high[place]]
     if acting:
         said.append(
-            sentence(
-                say(
-                    "beyond the intervals {acting} also act through others: total above first order",
-                    acting=joined(acting),
-                )
+            say(
+                "Beyond the intervals {parameters} also act through others: total above first order.",
+                parameters=joined(acting),
             )
         )
     least = [number_words(key, fleet) for key, high in zip(study.keys, total.high, strict=True) if high < COUNTS]
@@ -160,9 +167,9 @@ def _of_variance(fleet: Fleet, study: SweepSensitivity, level: LevelInStudy) -> 
         said.append(
             sentence(
                 say(
-                    "{least} could lie anywhere in the range: total index below {percent}",
-                    least=joined(least),
-                    percent=_percent(COUNTS),
+                    "{parameters} could lie anywhere in the range: total index below {share}.",
+                    parameters=joined(least),
+                    share=_percent(COUNTS),
                 )
             )
         )
@@ -179,47 +186,50 @@ def _of_line(fleet: Fleet, study: SweepSensitivity, level: LevelInStudy) -> list
     told = [place for place in study.ranking() if standardised.low[place] * standardised.high[place] > 0.0]
     named = [
         say(
-            "{number} ({value:+.1f} dB over its range, {low:+.1f} to {high:+.1f})",
-            number=number_words(study.keys[place], fleet),
-            value=slope.value[place],
+            "{parameter} ({change:+.1f} dB over its range, {low:+.1f} to {high:+.1f})",
+            parameter=number_words(study.keys[place], fleet),
+            change=slope.value[place],
             low=slope.low[place],
             high=slope.high[place],
         )
         for place in told[:MOST_NAMED]
     ]
-    said = [say("Along a straight line it moves most with {named}.", named=joined(named))] if named else []
+    said = []
+    if named:
+        said.append(say("Along a straight line it moves most with {parameters}.", parameters=joined(named)))
     constant = np.isnan(standardised.value)
     unclear = [number_words(key, fleet) for n, key in enumerate(study.keys) if n not in told and not constant[n]]
     if unclear:
-        said.append(sentence(say("of {unclear} the intervals leave open even the sign", unclear=joined(unclear))))
+        said.append(say("Of {parameters} the intervals leave open even the sign.", parameters=joined(unclear)))
     still = [number_words(key, fleet) for key, one in zip(study.keys, constant, strict=True) if one]
     if still:
         said.append(
-            sentence(
-                say("of {still} nothing can be said: at all points that can be it is the same", still=joined(still))
+            say(
+                "Of {parameters} nothing can be said: at all points that can be it is the same.",
+                parameters=joined(still),
             )
         )
-    explained = say("The line has {percent} of the variance (R²)", percent=_percent(regression.explained))
-    if regression.explained >= STRAIGHT:
-        return [*said, say("{explained}, so that the coefficients describe it.", explained=explained)]
-    if regression.explained_ranks >= STRAIGHT:
-        ranks = say(
-            "{explained}, a line between ranks {percent}",
-            explained=explained,
-            percent=_percent(regression.explained_ranks),
+    return [*said, _explained_words(regression.explained, regression.explained_ranks)]
+
+
+def _explained_words(line: float, ranks: float) -> str:
+    """How much of the variance a line has, and what to go by."""
+    if line >= STRAIGHT:
+        return say(
+            "The line has {share} of the variance (R²), so that the coefficients describe it.", share=_percent(line)
         )
-        return [
-            *said,
-            say("{ranks}: the level bends, but mostly only rises or falls; go by the rank correlations.", ranks=ranks),
-        ]
-    return [
-        *said,
-        say(
-            "{explained}: it bends, turns or interacts too much for coefficients to tell what "
-            'decides it. Take sampling = "saltelli".',
-            explained=explained,
-        ),
-    ]
+    if ranks >= STRAIGHT:
+        return say(
+            "The line has {share} of the variance (R²), a line between ranks {share_of_ranks}: the level bends, but "
+            "mostly only rises or falls; go by the rank correlations.",
+            share=_percent(line),
+            share_of_ranks=_percent(ranks),
+        )
+    return say(
+        "The line has {share} of the variance (R²): it bends, turns or interacts too much for coefficients to tell "
+        'what decides it. Take sampling = "saltelli".',
+        share=_percent(line),
+    )
 
 
 def _percent(part: float) -> str:

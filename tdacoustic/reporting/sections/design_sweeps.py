@@ -19,7 +19,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Figure, Heatmap, Line
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.design_studies import design_study
 from tdacoustic.reporting.sections.parameters import value_words
 from tdacoustic.reporting.sections.words import joined, slug
@@ -61,11 +61,12 @@ def _of(result: FleetPrediction, found: SweepResult) -> Section:
         blocks.append(
             Notice(
                 "warning",
-                say(
-                    "{n_refused} of {n_points} points cannot be: {told}.",
-                    n_refused=len(refused),
-                    n_points=len(found.points),
-                    told=told,
+                say_count(
+                    "{count} of {points} points cannot be: {reasons}.",
+                    "{count} of {points} points cannot be: {reasons}.",
+                    len(refused),
+                    points=len(found.points),
+                    reasons=told,
                 ),
             )
         )
@@ -85,8 +86,8 @@ def _over_grid(result: FleetPrediction, found: SweepResult, name: str) -> list[B
             blocks.append(FigureBlock(_lines(result, found, name), "calculated"))
         elif len(axes) == 2 and numeric and all(len(values) > 1 for values in axes):
             blocks += _maps(result, found, name)
-    told = joined([say("{label} is {key}", label=_label(result, key), key=key) for key in keys])
-    return [*blocks, Paragraph(say("In the fleet file: {told}.", told=told))]
+    told = joined([say("{parameter} is {key}", parameter=_label(result, key), key=key) for key in keys])
+    return [*blocks, Paragraph(say("In the fleet file: {parameters}.", parameters=told))]
 
 
 def _label(result: FleetPrediction, key: str) -> str:
@@ -108,12 +109,12 @@ def _lines(result: FleetPrediction, found: SweepResult, name: str) -> Figure:
     some = (
         ""
         if len(lines) <= MOST_LINES
-        else say("{most_lines} of {n_lines} conditions are drawn.", most_lines=MOST_LINES, n_lines=len(lines))
+        else say("{shown} of {held} conditions are drawn.", shown=MOST_LINES, held=len(lines))
     )
     label = _label(result, key)
     return Figure(
         name,
-        say("Total over {label}{label_2}", label=label[:1].lower(), label_2=label[1:]),
+        say("Total over {parameter}", parameter=number_words(key, result.fleet)),
         some,
         Axis(label, unit_of(key), "log" if wide else "linear"),
         Axis(say("Sound pressure level"), "dB", reference="20 µPa"),
@@ -152,7 +153,8 @@ def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
     columns = [Column("point", say("Point"), "", 0, "number")]
     columns += [Column(key.replace(".", "_"), _label(result, key), unit_of(key)) for key in keys]
     columns += [
-        Column(f"condition_{one}", say("Condition {one}", one=one), "dB", 1, "number") for one in found.conditions
+        Column(f"condition_{one}", say("Condition {condition}", condition=one), "dB", 1, "number")
+        for one in found.conditions
     ]
     columns += [Column("reason", say("Why not"))] if any(found.reasons) else []
     levels = found.of("spl_4m_db")
@@ -162,10 +164,7 @@ def _table(result: FleetPrediction, found: SweepResult, name: str) -> Table:
         shown = [None if math.isnan(level) else level for level in levels[number].tolist()]
         rows.append([number + 1, *values, *shown, *([reason] if any(found.reasons) else [])])
     n = len(found.points)
-    some = (
-        ""
-        if n <= MOST_ROWS
-        else say("; the first {most_rows} of {n} points, all are in sweeps.csv", most_rows=MOST_ROWS, n=n)
-    )
-    caption = say("Total at {surface} by point and condition{some}", surface=result.prediction.surface, some=some)
-    return Table(f"{name}-points", caption, columns, rows, origin="calculated")
+    caption = [say("Total at {surface} by point and condition", surface=result.prediction.surface)]
+    if n > MOST_ROWS:
+        caption.append(say("the first {shown} of {held} points, all are in sweeps.csv", shown=MOST_ROWS, held=n))
+    return Table(f"{name}-points", "; ".join(caption), columns, rows, origin="calculated")

@@ -26,8 +26,8 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.gear_words import sentence
+from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.sections.gear_words import named_conditions, range_words, sentence
 from tdacoustic.reporting.sections.paper_features import judged_words
 from tdacoustic.reporting.sections.printed import PAPER, is_of_the_paper
 from tdacoustic.reporting.sections.sound_paths import heard_paths, is_added
@@ -38,7 +38,7 @@ __all__ = ["directivity"]
 
 MOST_LINES: Final = 8
 
-_SIDES: Final = ((0.0, "travel"), (90.0, "left"), (180.0, "back"), (270.0, "right"))
+_SIDES: Final = ((0.0, mark("travel")), (90.0, mark("left")), (180.0, mark("back")), (270.0, mark("right")))
 
 
 class Around(NamedTuple):
@@ -119,11 +119,11 @@ def _method(result: FleetPrediction) -> str:
     radius_m = result.fleet.radiation.circle_radius_m.value
     added = [path.phrase for path in heard_paths(result.prediction.sound) if is_added(result.fleet, path)]
     return say(
-        "Levels on a circle of {radius_m:g} m around the drive's centre in the plane z = 0, "
+        "Levels on a circle of {radius:g} m around the drive's centre in the plane z = 0, "
         "every 5°. 0° is the direction of travel (x), 90° is to the left (y), 180° is behind, "
-        "270° is to the right. The levels are those of the total, which adds {added}.",
-        radius_m=radius_m,
-        added=joined(added),
+        "270° is to the right. The levels are those of the total, which adds {paths}.",
+        radius=radius_m,
+        paths=joined(added),
     )
 
 
@@ -131,9 +131,9 @@ def _speed_words(result: FleetPrediction, speeds: list[Around]) -> list[str]:
     widest = max(speeds, key=lambda around: around.range_db)
     found = [
         say(
-            "the directions differ most in condition {name}, by {range_db:.1f} dB",
+            "the directions differ most in condition {name}, by {difference:.1f} dB",
             name=widest.name,
-            range_db=widest.range_db,
+            difference=widest.range_db,
         )
     ]
     found += [_beyond_words(result), _shape_words(result, speeds), judged_words(result, ("pattern", "loudest_deg"))]
@@ -154,11 +154,10 @@ def _beyond_words(result: FleetPrediction) -> str:
     if not beyond:
         return ""
     return say(
-        "all that the total adds in condition{value} {beyond} lies outside of the {low:.0f} to "
+        "all that the total adds in {conditions} lies outside of the {low:.0f} to "
         "{high:.0f} Hz that the housing is computed for, so that the housing has no part in the "
         "directions there",
-        value="s" if len(beyond) > 1 else "",
-        beyond=joined(beyond),
+        conditions=named_conditions(beyond),
         low=low,
         high=high,
     )
@@ -170,36 +169,33 @@ def _shape_words(result: FleetPrediction, speeds: list[Around]) -> str:
     alike = [pair.correlation for pair in result.pattern_pairs if pair.sweep == "speed" and pair.both_shaped]
     if not alike:
         return ""
-    ends = list(dict.fromkeys(f"{value:.2f}" for value in (min(alike), max(alike))))
-    text = say(
-        "the shapes of the {n_shaped} conditions with {shaped_db:g} dB or more between "
-        "directions correlate in pairs with {ends} (1 is the same shape)",
-        n_shaped=len(shaped),
-        shaped_db=SHAPED_DB,
-        ends=" to ".join(ends),
-    )
+    said = [
+        say(
+            "the shapes of the {count} conditions with {difference:g} dB or more between "
+            "directions correlate in pairs with {correlations} (1 is the same shape)",
+            count=len(shaped),
+            difference=SHAPED_DB,
+            correlations=range_words(f"{min(alike):.2f}", f"{max(alike):.2f}"),
+        )
+    ]
     if is_of_the_paper(result.fleet):
-        text += say("; {paper} calls the shape invariant with speed", paper=say(PAPER))
-    return pretty_signs(text)
+        said.append(say("{paper} calls the shape invariant with speed", paper=say(PAPER)))
+    return pretty_signs("; ".join(said))
 
 
 def _figures(name: str, of_what: str, held: Sequence[Around]) -> list[FigureBlock]:
     """The levels, and the same relative to the loudest direction of each."""
     shown = _spread(held)
-    some = (
-        ""
-        if len(shown) == len(held)
-        else say(" {n_shown} of {n_held} are drawn.", n_shown=len(shown), n_held=len(held))
-    )
+    some = [say("{count} of {all} are drawn.", count=len(shown), all=len(held))] if len(shown) < len(held) else []
     levels = [around.circle.level_db for around in shown]
     axis = Axis(say("Sound pressure level"), "dB", reference="20 µPa")
     title = say("Level around the drive over the direction, {of_what}", of_what=of_what)
-    found = [_figure(name, title, some.strip(), axis, shown, levels)]
+    found = [_figure(name, title, " ".join(some), axis, shown, levels)]
     if len(shown) > 1 and any(around.range_db >= SHAPED_DB for around in shown):
         relative = [values - values.max() for values in levels]
         axis = Axis(say("Level"), "dB", reference=say("the loudest direction"))
         title = say("Shape of the level around the drive, {of_what}", of_what=of_what)
-        caption = say("Each relative to its own loudest direction.{some}", some=some)
+        caption = " ".join([say("Each relative to its own loudest direction."), *some])
         found.append(_figure(f"{name}-shape", title, caption, axis, shown, relative))
     return [FigureBlock(figure, "calculated") for figure in found]
 
@@ -222,7 +218,7 @@ def _figure(
         Line(np.append(around.circle.angle_deg, 360.0), np.append(values, values[0]), around.name)
         for around, values in zip(shown, levels, strict=True)
     ]
-    elements += [Rule(angle, side) for angle, side in _SIDES]
+    elements += [Rule(angle, say(side)) for angle, side in _SIDES]
     return Figure(name, title, caption, Axis(say("Direction"), "°", limits=(0.0, 360.0)), axis, elements, height=380)
 
 
@@ -230,9 +226,9 @@ def _table(name: str, caption: str, of: str, held: Sequence[Around]) -> Table:
     columns = (
         Column("of", of),
         Column("loudest_db", say("Loudest"), "dB", 1, "number"),
-        Column("loudest_deg", "at", "°", 0, "number"),
+        Column("loudest_deg", say("at"), "°", 0, "number"),
         Column("quietest_db", say("Quietest"), "dB", 1, "number"),
-        Column("quietest_deg", "at", "°", 0, "number"),
+        Column("quietest_deg", say("at"), "°", 0, "number"),
         Column("range_db", say("Range"), "dB", 1, "number"),
     )
     rows: list[list[Cell]] = []
@@ -263,7 +259,7 @@ def _alike(result: FleetPrediction, name: str, of: str, sweep: str, held: Sequen
         rows.append(row)
     caption = say(
         "How alike the shapes are: correlation of each two over the directions, of levels in dB "
-        "less their mean; shapes of less than {shaped_db:g} dB say little",
-        shaped_db=SHAPED_DB,
+        "less their mean; shapes of less than {difference:g} dB say little",
+        difference=SHAPED_DB,
     )
     return [Details(say("Shapes in pairs"), [Table(name, caption, columns, rows, origin="calculated")])]

@@ -193,9 +193,7 @@ def _of_condition(fleet: Fleet, state: GearState, around: str) -> str:
             )
         )
     if state.masuda_db is not None:
-        parts.append(
-            say("Masuda's level {level:.1f} {unit} at 1 m", level=state.masuda_db, unit=level_unit(fleet))
-        )
+        parts.append(say("Masuda's level {level:.1f} {unit} at 1 m", level=state.masuda_db, unit=level_unit(fleet)))
     parts += [around] if around else []
     return sentence(f"{start}; {', '.join(parts)}. {sentence(motion_words(steady))}")
 

@@ -143,9 +143,7 @@ def by_speed(states: Sequence[GearState]) -> list[GearState]:
 
 def state_words(state: GearState) -> str:
     """Return a condition's name with its speed."""
-    return say(
-        "condition {name} ({speed:.4g} km/h)", name=state.condition.name, speed=state.condition.train_speed_km_h
-    )
+    return say("condition {name} ({speed:.4g} km/h)", name=state.condition.name, speed=state.condition.train_speed_km_h)
 
 
 def conditions_words(states: Sequence[GearState]) -> str:

@@ -9,12 +9,25 @@ import numpy as np
 from tdacoustic.drive import HelixCase
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Figure, Line
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import level_unit, micrometres, motion_cells
 from tdacoustic.reporting.sections.sound_paths import heard_paths, path_line
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["helix_sweep", "helix_words"]
+
+FOLLOWS = mark(
+    "Rack, teeth, profile shifts and face width stay; the centre distance, the contact ratios, the stiffness of the "
+    "mesh and the working pressure angle follow from the helix angle."
+)
+STAYS = mark(
+    "Masses, inertias, bearings, and the unloaded transmission error stay as they are: that a longer contact line "
+    "averages a real one more is left out."
+)
+STAYS_WITH_HOUSING = mark(
+    "Masses, inertias, bearings, the housing and its seats, and the unloaded transmission error stay as they are: that "
+    "a longer contact line averages a real one more is left out."
+)
 
 
 def helix_sweep(result: FleetPrediction) -> Section | None:
@@ -52,31 +65,22 @@ def helix_words(result: FleetPrediction) -> str:
     least, most = (pick(cases, key=lambda case: case.gears.steady.dte_pp_m) for pick in (min, max))
     distances = [1e3 * case.unit.geometry.centre_distance_m for case in cases]
     return say(
-        "helix angles {helix_angle_deg}: the DTE is between {micrometres} "
-        "({helix_angle_deg_2:g}°) and {micrometres_2} ({helix_angle_deg_3:g}°), with the centre "
-        "distance from {distances:.1f} to {distances_2:.1f} mm",
-        helix_angle_deg=", ".join(f"{case.helix_angle_deg:g}°" for case in cases),
-        micrometres=micrometres(least.gears.steady.dte_pp_m),
-        helix_angle_deg_2=least.helix_angle_deg,
-        micrometres_2=micrometres(most.gears.steady.dte_pp_m),
-        helix_angle_deg_3=most.helix_angle_deg,
-        distances=min(distances),
-        distances_2=max(distances),
+        "helix angles {angles}: the DTE is between {least} ({least_at:g}°) and {most} ({most_at:g}°), with the centre "
+        "distance from {nearest:.1f} to {farthest:.1f} mm",
+        angles=", ".join(f"{case.helix_angle_deg:g}°" for case in cases),
+        least=micrometres(least.gears.steady.dte_pp_m),
+        least_at=least.helix_angle_deg,
+        most=micrometres(most.gears.steady.dte_pp_m),
+        most_at=most.helix_angle_deg,
+        nearest=min(distances),
+        farthest=max(distances),
     )
 
 
 def _method(result: FleetPrediction, case: HelixCase) -> str:
-    condition = case.gears.condition
-    stays = "" if result.prediction.housing is None else say("the housing and its seats, ")
-    return say(
-        "At {train_speed_km_h:.4g} km/h, the fastest condition. Rack, teeth, profile shifts and "
-        "face width stay; the centre distance, the contact ratios, the stiffness of the mesh and "
-        "the working pressure angle follow from the helix angle. Masses, inertias, bearings, "
-        "{stays}and the unloaded transmission error stay as they are: that a longer contact line "
-        "averages a real one more is left out.",
-        train_speed_km_h=condition.train_speed_km_h,
-        stays=stays,
-    )
+    stays = say(STAYS) if result.prediction.housing is None else say(STAYS_WITH_HOUSING)
+    speed = say("At {speed:.4g} km/h, the fastest condition.", speed=case.gears.condition.train_speed_km_h)
+    return f"{speed} {say(FOLLOWS)} {stays}"
 
 
 def _table(result: FleetPrediction, cases: list[HelixCase]) -> Table:
@@ -127,7 +131,7 @@ def _level_figure(result: FleetPrediction, cases: list[HelixCase], angles: np.nd
     levels = {key: np.array([math.nan if level is None else level for level in row]) for key, row in of.items()}
     lines = [path_line(result.fleet, path, angles, levels[path.key]) for path in held]
     if np.isfinite(levels["total"]).any():
-        lines.insert(0, Line(angles, levels["total"], "total", color=7, points=True))
+        lines.insert(0, Line(angles, levels["total"], say("total"), color=7, points=True))
     return Figure(
         "helix-level",
         say("Level at {surface} over the helix angle", surface=surface),

@@ -11,6 +11,7 @@ from tdacoustic.gears import GEARS
 from tdacoustic.reporting.document import Block, Details, Fact, Facts, FigureBlock, Paragraph, Section, Sentences
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
 from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.sections.gear_words import gear_word
 from tdacoustic.reporting.sections.housing_parameters import HOUSING_SECTIONS, housing_named
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import joined, pretty_signs
@@ -83,17 +84,17 @@ def _facts(housing: HousingFacts) -> list[Fact]:
     first = [f"{value:.1f}" for value in modes[:FIRST_MODES]]
     facts = [] if housing.step_file is None else [Fact(say("From the STEP file"), housing.step_file)]
     facts += [
-        Fact(say("Mass"), say("{mass_kg:.0f} kg, of the finite elements", mass_kg=housing.mass_kg)),
+        Fact(say("Mass"), say("{mass:.0f} kg, of the finite elements", mass=housing.mass_kg)),
         Fact(say("Frequency range"), say("{low:.0f} to {high:.0f} Hz", low=low, high=high)),
         Fact(
             say("Modes"),
             say(
-                "{below} with natural frequencies up to {high:.0f} Hz; kept are {n_modes} and "
-                "{corrections} shapes of a static correction, which stand for the modes beyond",
-                below=below,
-                high=high,
-                n_modes=len(modes),
-                corrections=housing.corrections,
+                "{count} with natural frequencies up to {highest:.0f} Hz; kept are {kept} and {shapes} shapes of a "
+                "static correction, which stand for the modes beyond",
+                count=below,
+                highest=high,
+                kept=len(modes),
+                shapes=housing.corrections,
             ),
         ),
         Fact(say("First natural frequencies"), f"{', '.join(first)}{', ...' if len(modes) > FIRST_MODES else ''} Hz"),
@@ -113,20 +114,20 @@ def _place(position_m: tuple[float, float, float]) -> str:
 def _split_words(housing: HousingFacts) -> str:
     shares = [100.0 * share for share in housing.left_share]
     if abs(shares[0] - shares[1]) < 0.05:
-        of_left = say("{shares:.3g} % of the force of either gear", shares=shares[0])
+        of_left = say("{share:.3g} % of the force of either gear", share=shares[0])
     else:
         of_left = joined(
             [
-                say("{share:.3g} % of that of the {gear}", share=share, gear=gear)
+                say("{share:.3g} % of that of the {gear}", share=share, gear=gear_word(gear))
                 for share, gear in zip(shares, GEARS, strict=True)
             ]
         )
     return say(
         "A gear's bearing force, which the gear model has as a total, is split between its two "
         "bearings by the lever rule for where the gear stands on its shaft: the left bearing "
-        "takes {of_left}, the right one the rest. So is the axial force, which in truth one "
+        "takes {shares}, the right one the rest. So is the axial force, which in truth one "
         "bearing may hold alone and which tilts it.",
-        of_left=of_left,
+        shares=of_left,
     )
 
 
@@ -140,7 +141,7 @@ def _figure(result: FleetPrediction, housing: HousingFacts) -> Figure:
     modes = np.sort(housing.mode_hz[housing.mode_hz <= high])
     x = np.concatenate([[0.0], np.repeat(modes, 2), [high]])
     y = np.repeat(np.arange(modes.size + 1.0), 2)
-    elements: list[Element] = [Line(x, y, "modes")]
+    elements: list[Element] = [Line(x, y, say("modes"))]
     elements += [
         Rule(state.mesh_hz, state.condition.name) for state in result.prediction.conditions if state.mesh_hz <= high
     ]
@@ -166,8 +167,8 @@ def _parameters(result: FleetPrediction) -> Details:
     assumed = [row[2] for row in table.rows].count("assumed")
     return Details(
         say(
-            "{n_rows} parameters of housing and sound field, {assumed} of them assumed",
-            n_rows=len(table.rows),
+            "{count} parameters of housing and sound field, {assumed} of them assumed",
+            count=len(table.rows),
             assumed=assumed,
         ),
         [table],

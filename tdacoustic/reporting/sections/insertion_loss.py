@@ -22,7 +22,7 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.gear_words import hertz
+from tdacoustic.reporting.sections.gear_words import hertz, named_conditions, sentence
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
 
@@ -31,8 +31,11 @@ __all__ = ["insertion_loss_section"]
 METHOD: Final = mark(
     "The insertion loss is the sound power level of a source in free field less the one that the housing radiates with "
     "the source inside; the latter from the mean over the surface at {surface}. The source is a point whose volume "
-    "flow is held. It stands {place}. The air inside and the walls act on each other: modes of the air between rigid "
-    "walls and the housing's modes (finite elements); boundary elements give the sound outside."
+    "flow is held."
+)
+ELEMENTS: Final = mark(
+    "The air inside and the walls act on each other: modes of the air between rigid walls and the housing's modes "
+    "(finite elements); boundary elements give the sound outside."
 )
 LEFT_OUT: Final = mark(
     "The housing is closed: bearings, seals and vents let no sound through. Seats, gears, shafts and oil take no room, "
@@ -45,9 +48,9 @@ MASS_LAW: Final = mark(
     "resonate, and towards the coincidence of bending and sound waves, more goes through."
 )
 
-CAPTION: Final = (
+CAPTION: Final = mark(
     "Insertion loss at the mesh frequencies; with half and twice the loss factor η of the air inside; least and most "
-    f"with the source there and {1e3 * ASIDE_M:g} mm off along x, y and z"
+    "with the source there and {aside:g} mm off along x, y and z"
 )
 _SENSITIVE_DB: Final = 5.0
 """Change of the insertion loss from which the report names what changes it [assumed]."""
@@ -59,8 +62,9 @@ def insertion_loss_section(result: FleetPrediction) -> Section | None:
     if held is None or not held.frequency_hz.size:
         return None
     fleet = result.fleet
+    method = (say(METHOD, surface=result.prediction.surface), _place_words(fleet, held), say(ELEMENTS))
     blocks: list[Block] = [
-        Paragraph(say(METHOD).format(surface=result.prediction.surface, place=_place_words(fleet, held))),
+        Paragraph(" ".join(method)),
         Sentences([text for text in (_range_words(held), _of_air_words(held), _aside_words(held)) if text]),
         FigureBlock(_figure(held), "calculated"),
         _at_mesh(held),
@@ -72,12 +76,16 @@ def insertion_loss_section(result: FleetPrediction) -> Section | None:
 
 def _place_words(fleet: Fleet, held: InsertionLoss) -> str:
     x, y, z = (pretty_signs(f"{place:.3g}") for place in held.source_m)
-    where = say("at x = {x}, y = {y}, z = {z} m in the drive's frame", x=x, y=y, z=z)
-    stated = fleet.masuda.placement.value == "inside" and fleet.masuda.position_m is not None
-    return (
-        say("{where} ([masuda] position_m)", where=where)
-        if stated
-        else say("at the pitch point between the shafts [assumed], {where}", where=where)
+    if fleet.masuda.placement.value == "inside" and fleet.masuda.position_m is not None:
+        return say(
+            "It stands at x = {x}, y = {y}, z = {z} m in the drive's frame ([masuda] position_m).", x=x, y=y, z=z
+        )
+    return say(
+        "It stands at the pitch point between the shafts [assumed], at x = {x}, y = {y}, z = {z} m in the drive's "
+        "frame.",
+        x=x,
+        y=y,
+        z=z,
     )
 
 
@@ -86,35 +94,29 @@ def _known(held: InsertionLoss) -> list[MeshLoss]:
 
 
 def _range_words(held: InsertionLoss) -> str:
-    text = ""
+    clauses = []
     if held.band_db.size:
         low, high = int(np.argmin(held.band_db)), int(np.argmax(held.band_db))
-        text = say(
-            "In third octaves the housing takes {band_db:.0f} dB (at {nominal} Hz) to "
-            "{band_db_2:.0f} dB (at {nominal_2} Hz)",
-            band_db=held.band_db[low],
-            nominal=_nominal(held.band_hz[low]),
-            band_db_2=held.band_db[high],
-            nominal_2=_nominal(held.band_hz[high]),
+        clauses.append(
+            say(
+                "in third octaves the housing takes {least:.0f} dB (at {least_at} Hz) to {most:.0f} dB (at "
+                "{most_at} Hz)",
+                least=held.band_db[low],
+                least_at=_nominal(held.band_hz[low]),
+                most=held.band_db[high],
+                most_at=_nominal(held.band_hz[high]),
+            )
         )
-    known = _known(held)
-    if known:
-        parts = joined(
-            [
-                say("{loss_db:.0f} dB in condition {condition}", loss_db=mesh.loss_db, condition=mesh.condition)
-                for mesh in known
-            ]
-        )
-        text += say("{value} the mesh frequencies {parts}", value=say("; at") if text else say("At"), parts=parts)
+    losses = [
+        say("{loss:.0f} dB in condition {condition}", loss=mesh.loss_db, condition=mesh.condition)
+        for mesh in _known(held)
+    ]
+    if losses:
+        clauses.append(say("at the mesh frequencies {losses}", losses=joined(losses)))
     beyond = [mesh.condition for mesh in held.at_mesh if mesh.loss_db is None]
     if beyond:
-        text += say(
-            "{value} condition{value_2} {beyond} it is not computed",
-            value=say("; of") if text else say("Of"),
-            value_2="s" if len(beyond) > 1 else "",
-            beyond=joined(beyond),
-        )
-    return f"{text}."
+        clauses.append(say("of {conditions} it is not computed", conditions=named_conditions(beyond)))
+    return sentence("; ".join(clauses)) if clauses else ""
 
 
 def _of_air_words(held: InsertionLoss) -> str:
@@ -129,9 +131,9 @@ def _of_air_words(held: InsertionLoss) -> str:
     parts = joined(
         [
             say(
-                "from {pair:.0f} to {pair_2:.0f} dB in condition {condition}",
-                pair=pair[0],
-                pair_2=pair[1],
+                "from {low:.0f} to {high:.0f} dB in condition {condition}",
+                low=pair[0],
+                high=pair[1],
                 condition=mesh.condition,
             )
             for mesh, pair in strong
@@ -139,8 +141,8 @@ def _of_air_words(held: InsertionLoss) -> str:
     )
     return say(
         "Where the air inside resonates its loss factor decides: from half to twice its value "
-        "the insertion loss goes {parts}.",
-        parts=parts,
+        "the insertion loss goes {changes}.",
+        changes=parts,
     )
 
 
@@ -152,47 +154,44 @@ def _aside_words(held: InsertionLoss) -> str:
     parts = joined(
         [
             say(
-                "{pair:.0f} to {pair_2:.0f} dB in condition {condition}",
-                pair=pair[0],
-                pair_2=pair[1],
+                "{low:.0f} to {high:.0f} dB in condition {condition}",
+                low=pair[0],
+                high=pair[1],
                 condition=mesh.condition,
             )
             for mesh, pair in strong
         ]
     )
     return say(
-        "The place of the source matters too: there and {aside_m:g} mm off along x, y or z it is "
-        "{parts}. A symmetric box with the source in its planes of symmetry answers with a part "
+        "The place of the source matters too: there and {aside:g} mm off along x, y or z it is "
+        "{losses}. A symmetric box with the source in its planes of symmetry answers with a part "
         "of its modes only.",
-        aside_m=1000.0 * ASIDE_M,
-        parts=parts,
+        aside=1000.0 * ASIDE_M,
+        losses=parts,
     )
 
 
 def _placement_words(fleet: Fleet, held: InsertionLoss) -> str:
     losses = [mesh.loss_db for mesh in _known(held) if mesh.loss_db is not None]
-    span = (
-        say("{losses:.0f} to {losses_2:.0f} dB", losses=min(losses), losses_2=max(losses))
-        if losses
-        else say("its insertion loss")
-    )
-    level = say("Masuda's level is that of gear units measured with their housings")
+    loss = say("{low:.0f} to {high:.0f} dB", low=min(losses), high=max(losses)) if losses else say("its insertion loss")
     placement = fleet.masuda.placement.value
     if placement == "inside":
         return say(
-            '[masuda] placement = "inside", as the paper has it: {level}, and here the housing '
-            'takes {span} from it a second time. With placement = "free" it would take nothing.',
-            level=level,
-            span=span,
+            '[masuda] placement = "inside", as the paper has it: Masuda\'s level is that of gear units measured with '
+            'their housings, and here the housing takes {loss} from it a second time. With placement = "free" it would '
+            "take nothing.",
+            loss=loss,
         )
     if placement == "off":
-        return say('[masuda] placement = "off": the meshing noise is no part of the total. {level}.', level=level)
+        return say(
+            '[masuda] placement = "off": the meshing noise is no part of the total. Masuda\'s level is that of gear '
+            "units measured with their housings."
+        )
     return say(
-        '[masuda] placement = "free": {level}, so the source stands outside and keeps its power; '
-        'none of this is taken from it. With placement = "inside", as the paper has it, the '
-        "meshing noise would be lower by {span}.",
-        level=level,
-        span=span,
+        '[masuda] placement = "free": Masuda\'s level is that of gear units measured with their housings, so the '
+        'source stands outside and keeps its power; none of this is taken from it. With placement = "inside", as the '
+        "paper has it, the meshing noise would be lower by {loss}.",
+        loss=loss,
     )
 
 
@@ -200,12 +199,12 @@ def _air_words(held: InsertionLoss) -> str:
     air = held.air
     return say(
         "The air inside has a loss factor of {loss_factor:g}, an absorption coefficient of "
-        "{absorption:.2g} at {hertz}; viscosity and heat conduction at bare walls alone would "
+        "{absorption:.2g} at {frequency}; viscosity and heat conduction at bare walls alone would "
         "give a loss factor of {bare_walls:.1g}. Gears, shafts, oil mist and leaks make the rest "
         "[assumed].",
         loss_factor=air.loss_factor,
         absorption=air.absorption,
-        hertz=hertz(air.frequency_hz),
+        frequency=hertz(air.frequency_hz),
         bare_walls=air.bare_walls,
     )
 
@@ -243,8 +242,7 @@ def _figure(held: InsertionLoss) -> Figure:
         say(
             "Lines 1/48 octave apart; third octaves are means of the radiated energy of equally strong lines. Diamonds "
             "with the names of the conditions stand at their mesh frequencies. The mass law is the transmission "
-            "loss of "
-            "limp walls."
+            "loss of limp walls."
         ),
         Axis(say("Frequency"), "Hz", "log"),
         Axis(say("Insertion loss"), "dB"),
@@ -267,13 +265,14 @@ def _at_mesh(held: InsertionLoss) -> Table:
         Column("half_air_loss_db", say("Air η/2"), "dB", 1, "number"),
         Column("double_air_loss_db", say("Air 2η"), "dB", 1, "number"),
         Column("beside_low_db", say("Moved: least"), "dB", 1, "number"),
-        Column("beside_high_db", "most", "dB", 1, "number"),
+        Column("beside_high_db", say("most"), "dB", 1, "number"),
     ]
     rows: list[Sequence[Cell]] = []
     for mesh in held.at_mesh:
         cells: list[Cell] = [mesh.condition, mesh.frequency_hz, mesh.loss_db, mesh.mass_law_db]
         rows.append([*cells, *(mesh.of_air_db or (None, None)), *(mesh.beside_db or (None, None))])
-    return Table("insertion-loss-at-mesh", CAPTION, columns, rows, origin="calculated")
+    caption = say(CAPTION, aside=1e3 * ASIDE_M)
+    return Table("insertion-loss-at-mesh", caption, columns, rows, origin="calculated")
 
 
 def _third_octaves(held: InsertionLoss) -> Table:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import re
+from functools import reduce
 
 from tdacoustic.attribution import RunKinematics
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Cell, Column, Paragraph, Section, Sentences, Table
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.parameters import parameter_table
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import Analysis
@@ -21,16 +22,15 @@ USED = re.compile(
 """Parameters of the fleet that the kinematics rests on."""
 
 _WORDS = {
-    "train.wheel_diameter_mm": ("Wheel diameter", "mm"),
-    "motor.pole_pairs": ("Pole pairs of the motor", ""),
-    "motor.slip": ("Slip of the rotor", ""),
-    "motor.carrier_hz": ("Carrier of the inverter", "Hz"),
+    "train.wheel_diameter_mm": (mark("Wheel diameter"), "mm"),
+    "motor.pole_pairs": (mark("Pole pairs of the motor"), ""),
+    "motor.slip": (mark("Slip of the rotor"), ""),
+    "motor.carrier_hz": (mark("Carrier of the inverter"), "Hz"),
 }
-_EXCITATION_WORDS = {
-    "carrier": ("", "times the carrier"),
-    "supply": ("", "times the supply frequency"),
-    "shaft": ("", "times the motor shaft's turns"),
-    "fixed_hz": ("fixed part", "Hz"),
+_EXCITATION_UNITS = {
+    "carrier": mark("times the carrier"),
+    "supply": mark("times the supply frequency"),
+    "shaft": mark("times the motor shaft's turns"),
 }
 
 
@@ -44,12 +44,12 @@ def kinematics(analysis: Analysis) -> Section | None:
         text = say(
             "The calculated mesh frequency follows from the stated speed, the wheel diameter and the teeth (from the "
             "measured speed where none is stated). The observed one is fitted to the lines of the gearbox's sensors; "
-            "± is one standard deviation, and the excess is observed "
-            "over calculated, minus one. Slip between wheel and rail is not part of the calculation."
+            "± is one standard deviation, and the excess is observed over calculated, minus one. "
+            "Slip between wheel and rail is not part of the calculation."
         )
         origins = sorted({found.speed_source for _, found in held})
-        text += say(" Orders refer to the motor speed from: {origins}.", origins="; ".join(origins))
-        blocks += [Paragraph(text), _table(analysis, held)]
+        refer = say("Orders refer to the motor speed from: {origins}.", origins="; ".join(origins))
+        blocks += [Paragraph(f"{text} {refer}"), _table(analysis, held)]
         blocks.append(Sentences([_causes(run, found) for run, found in held]))
     else:
         blocks.append(Paragraph(say("No steady run whose speed is known, so no order has a frequency.")))
@@ -100,19 +100,20 @@ def _causes(run: MeasuredRun, found: RunKinematics) -> str:
     """One sentence: how far the observed mesh is off, and what that may come from."""
     if found.observed_mesh_hz is None or found.excess is None:
         return say(
-            "Run {name}: {causes}; one was calculated at {mesh_hz:.1f} Hz.",
-            name=run.name,
+            "Run {run}: {causes}; one was calculated at {frequency:.1f} Hz.",
+            run=run.name,
             causes=found.causes,
-            mesh_hz=found.mesh_hz,
+            frequency=found.mesh_hz,
         )
-    off = pretty_signs(f"{100.0 * found.excess:+.2f} %")
-    seen = say(
-        "the mesh is observed at {observed_mesh_hz:.1f} Hz, {off} against the calculated {mesh_hz:.1f} Hz",
-        observed_mesh_hz=found.observed_mesh_hz,
-        off=off,
-        mesh_hz=found.mesh_hz,
+    return say(
+        "Run {run}: the mesh is observed at {observed:.1f} Hz, {excess} against the calculated {calculated:.1f} Hz; "
+        "{causes}.",
+        run=run.name,
+        observed=found.observed_mesh_hz,
+        excess=pretty_signs(f"{100.0 * found.excess:+.2f} %"),
+        calculated=found.mesh_hz,
+        causes=_rivals(found.causes),
     )
-    return say("Run {name}: {seen}; {rivals}.", name=run.name, seen=seen, rivals=_rivals(found.causes))
 
 
 def _rivals(causes: str) -> str:
@@ -121,14 +122,17 @@ def _rivals(causes: str) -> str:
     if len(parts) == 1:
         return parts[0]
     measured = [part for part in parts if part.startswith("the measured speed")]
-    ruled_out = [say("it is {part}", part=part) for part in parts if part.startswith("not ")]
+    ruled_out = [say("it is {cause}", cause=part) for part in parts if part.startswith("not ")]
     rivals = [part for part in parts if not part.startswith(("the measured speed", "not "))]
-    return "; ".join([*measured, say("it may come from {rivals}", rivals=say(", or ").join(rivals)), *ruled_out])
+    if rivals:
+        causes = reduce(lambda one, other: say("{cause}, or {other}", cause=one, other=other), rivals)
+        measured.append(say("it may come from {causes}", causes=causes))
+    return "; ".join([*measured, *ruled_out])
 
 
 def _parameters(analysis: Analysis) -> Table:
     assert analysis.fleet is not None
-    title = say("What the kinematics rests on, from the fleet file of {name}", name=analysis.fleet.name)
+    title = say("What the kinematics rests on, from the fleet file of {fleet}", fleet=analysis.fleet.name)
     return parameter_table(
         "kinematics-parameters",
         title,
@@ -139,14 +143,17 @@ def _parameters(analysis: Analysis) -> Table:
 
 def _named(analysis: Analysis, key: str) -> tuple[str, str]:
     if key in _WORDS:
-        return _WORDS[key]
+        words, unit = _WORDS[key]
+        return say(words), unit
     assert analysis.fleet is not None
     parts = key.split(".")
     if parts[0] == "gear_pair":
         pairs = analysis.fleet.gear_pair
-        which = say(", gear pair {name}", name=pairs[int(parts[1]) - 1].name) if len(pairs) > 1 else ""
-        return say("Teeth of pinion and wheel{which}", which=which), ""
+        if len(pairs) == 1:
+            return say("Teeth of pinion and wheel"), ""
+        return say("Teeth of pinion and wheel, gear pair {pair}", pair=pairs[int(parts[1]) - 1].name), ""
     assert analysis.fleet.motor is not None
-    words, unit = _EXCITATION_WORDS[parts[-1]]
     name = analysis.fleet.motor.excitation[int(parts[2]) - 1].name
-    return say("Excitation {name}{value}{words}", name=name, value=", " if words else "", words=words), unit
+    if parts[-1] == "fixed_hz":
+        return say("Excitation {excitation}, fixed part", excitation=name), "Hz"
+    return say("Excitation {excitation}", excitation=name), say(_EXCITATION_UNITS[parts[-1]])

@@ -11,8 +11,8 @@ import numpy as np
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure, Line, Markers
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.words import measured_channels, pretty_unit, slug, tested_runs
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.words import measured_channels, pretty_unit, quantity_word, slug, tested_runs
 from tdacoustic.results import Analysis
 from tdacoustic.units import REFERENCES, level_db, reference_label
 
@@ -30,12 +30,10 @@ def levels(analysis: Analysis) -> Section:
         Paragraph(
             say(
                 "The rms is of the whole record after its mean is removed; the level is that rms, corrected for "
-                "background "
-                "where background runs exist, and so are the A-weighted level and that in the band, each by its own; "
-                "rms "
-                "and third octaves are as measured. The A-weighted level applies the analytic curve of IEC 61672-1 "
-                "to the "
-                "spectrum. The level in the band leaves out what lies outside the band given beside it."
+                "background where background runs exist, and so are the A-weighted level and that in the band, each "
+                "by its own; rms and third octaves are as measured. The A-weighted level applies the analytic curve "
+                "of IEC 61672-1 to the spectrum. The level in the band leaves out what lies outside the band "
+                "given beside it."
             )
         )
     )
@@ -73,7 +71,7 @@ def _table(analysis: Analysis) -> Table:
         Column("run", say("Run")),
         Column("channel", say("Channel")),
         Column("quantity", say("Quantity")),
-        Column("rms", "rms", say("SI"), 4, "number"),
+        Column("rms", say("rms"), say("SI"), 4, "number"),
         Column("si_unit", say("Unit")),
         Column("level_db", say("Level"), "dB", 1, "number"),
         Column("laeq_db", say("A-weighted"), "dB(A)", 1, "number"),
@@ -89,11 +87,11 @@ def _table(analysis: Analysis) -> Table:
             Column("correction", say("Correction")),
         ]
     rows = [[_cell(row, column) for column in columns] for row in table.to_dict("records")]
-    band = say("; the band is {next}", next=next(iter(bands))) if len(bands) == 1 else ""
-    references = say("sound pressure re 20 µPa, acceleration re 1 µm/s²")
+    of = [say("sound pressure re 20 µPa, acceleration re 1 µm/s²")]
+    of += [say("the band is {band}", band=band) for band in bands] if len(bands) == 1 else []
     return Table(
         "levels",
-        say("Levels ({references}{band})", references=references, band=band),
+        say("Levels ({details})", details="; ".join(of)),
         columns,
         rows,
         origin=analysis.campaign.origin,
@@ -103,11 +101,7 @@ def _table(analysis: Analysis) -> Table:
 def _band_words(row: Mapping[Hashable, Any]) -> str:
     if math.isnan(row["level_band_from_hz"]):
         return ""
-    return say(
-        "{level_band_from_hz:.4g} to {level_band_to_hz:.5g} Hz",
-        level_band_from_hz=row["level_band_from_hz"],
-        level_band_to_hz=row["level_band_to_hz"],
-    )
+    return say("{lowest:.4g} to {highest:.5g} Hz", lowest=row["level_band_from_hz"], highest=row["level_band_to_hz"])
 
 
 def _cell(row: Mapping[Hashable, Any], column: Column) -> Any:
@@ -117,13 +111,9 @@ def _cell(row: Mapping[Hashable, Any], column: Column) -> Any:
     if column.kind == "number":
         return value
     words = value if isinstance(value, str) else ""
-    return (
-        pretty_unit(words)
-        if column.key == "si_unit"
-        else words.replace("_", " ")
-        if column.key == "quantity"
-        else words
-    )
+    if column.key == "si_unit":
+        return pretty_unit(words)
+    return quantity_word(words) if column.key == "quantity" else words
 
 
 def _bands(analysis: Analysis) -> list[Block]:
@@ -139,14 +129,14 @@ def _bands(analysis: Analysis) -> list[Block]:
             y = np.array([np.nan if level is None else level for level in found])
             slot = len([e for e in by_channel.get(channel.name, []) if isinstance(e, Line)]) % 8
             elements = by_channel.setdefault(channel.name, [])
-            elements.append(Line(x, y, say("run {name}", name=run.name), style="steps", color=slot))
+            elements.append(Line(x, y, say("run {run}", run=run.name), style="steps", color=slot))
             doubtful = [index for index, band in enumerate(result.bands) if band.filter_dependent]
             if doubtful:
                 elements.append(
                     Markers(
                         x[doubtful],
                         y[doubtful],
-                        say("run {name}: depends on the filter", name=run.name),
+                        say("run {run}: depends on the filter", run=run.name),
                         symbol="x",
                         color=slot,
                     )
@@ -160,7 +150,10 @@ def _bands(analysis: Analysis) -> list[Block]:
     far = [figures[name] for name in figures if quantities[name] != "sound_pressure"]
     blocks: list[Block] = [*near]
     if far:
-        blocks.append(Details(say("Third octaves of {n_far} vibration channels", n_far=len(far)), far))
+        folded = say_count(
+            "Third octaves of {count} vibration channel", "Third octaves of {count} vibration channels", len(far)
+        )
+        blocks.append(Details(folded, far))
     return [Section("third-octaves", say("Third octaves"), blocks)] if blocks else []
 
 
@@ -168,7 +161,7 @@ def _band_figure(name: str, quantity: str, elements: list[Line | Markers]) -> Fi
     label = say("Sound pressure level") if quantity == "sound_pressure" else say("Acceleration level")
     return Figure(
         slug("bands", name),
-        say("Third-octave levels, {name}", name=name),
+        say("Third-octave levels, {channel}", channel=name),
         say(
             "Class-1 filters (IEC 61260-1). A cross marks a band within three bands of a line that is more than 15 dB "
             "stronger: its level depends on the skirts of the filter, and another analyser may show several dB more or "

@@ -11,7 +11,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Paragraph, Section, Table, walk
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.folding import few
 from tdacoustic.reporting.sections.words import joined
 from tdacoustic.results import LogInput
 from tdacoustic.steps.record import Record
@@ -77,7 +78,7 @@ def lineage_sections(
     lineage : dict of str to str
         Anchor by section id.
     """
-    files = {say("sha256:{sha256}", sha256=file.sha256): file for file in inputs}
+    files = {f"sha256:{file.sha256}": file for file in inputs}
     behind: list[Block] = []
     anchors: dict[str, str] = {}
     fed: dict[str, Records] = {id_: resting_on(records, steps) for id_, steps in FED_BY.items()}
@@ -137,9 +138,9 @@ def settings_words(settings: str) -> str:
 
 def _shown(value: Any) -> str:
     if value is None:
-        return "none"
+        return say("none")
     if isinstance(value, bool):
-        return "yes" if value else "no"
+        return say("yes") if value else say("no")
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, dict):
@@ -155,18 +156,11 @@ def _object_words(value: Mapping[str, Any]) -> str:
     fields = value.get("fields", value)
     if isinstance(fields, dict) and isinstance(fields.get("name"), str):
         return str(fields["name"])
-    return str(value.get("$type", say("a table"))).rsplit(":", 1)[-1]
+    return str(value["$type"]).rsplit(":", 1)[-1] if "$type" in value else say("a table")
 
 
 def _items_words(items: Sequence[Any]) -> str:
-    if not items:
-        return "none"
-    shown = ", ".join(_shown(item) for item in items[:MOST_ITEMS])
-    return (
-        shown
-        if len(items) <= MOST_ITEMS
-        else say("{shown} and {most_items} more", shown=shown, most_items=len(items) - MOST_ITEMS)
-    )
+    return few([_shown(item) for item in items], MOST_ITEMS) if items else say("none")
 
 
 def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInput]) -> Section:
@@ -197,30 +191,23 @@ def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInpu
         rows,
     )
     told = [(f"{step}, {_labels(labels)}", words) for (step, words), labels in settings.items() if words]
-    folded = (
-        [Details(say("Settings of these steps, {n_told} entries", n_told=len(told)), [Facts(told)])] if told else []
-    )
-    words = _files_words([files[key] for key in read])
-    return Section(f"from-{id_}", say("Behind “{title}”", title=title), [words, table, *folded])
+    folded = say_count("Settings of these steps, {count} entry", "Settings of these steps, {count} entries", len(told))
+    blocks: list[Block] = [
+        _files_words([files[key] for key in read]),
+        table,
+        *([Details(folded, [Facts(told)])] if told else []),
+    ]
+    return Section(f"from-{id_}", say("Behind “{title}”", title=title), blocks)
 
 
 def _labels(labels: Sequence[str]) -> str:
     each = list(dict.fromkeys(labels))
-    if len(each) <= MOST_LABELS:
-        return ", ".join(each)
-    return say(
-        "{each} and {most_labels} more",
-        each=", ".join(each[: MOST_LABELS - 1]),
-        most_labels=len(each) - MOST_LABELS + 1,
-    )
+    return few(each, MOST_LABELS if len(each) <= MOST_LABELS else MOST_LABELS - 1)
 
 
 def _files_words(files: Sequence[LogInput]) -> Paragraph:
     if not files:
         return Paragraph(say("Computed from the campaign and the fleet without reading a log."))
-    named = [
-        say("{written} (SHA-256 {sha256})", written=file.written, sha256=file.sha256[:16])
-        for file in files[:MOST_FILES]
-    ]
-    named += [say("{most_files} more", most_files=len(files) - MOST_FILES)] if len(files) > MOST_FILES else []
-    return Paragraph(say("Read from {named}; whole SHA-256 in the table of inputs.", named=joined(named)))
+    named = [f"{file.written} (SHA-256 {file.sha256[:16]})" for file in files[:MOST_FILES]]
+    named += [say("{count} more", count=len(files) - MOST_FILES)] if len(files) > MOST_FILES else []
+    return Paragraph(say("Read from {files}; whole SHA-256 in the table of inputs.", files=joined(named)))

@@ -22,11 +22,11 @@ from tdacoustic.reporting.document import (
     SoundTrack,
     Table,
 )
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.played import can_encode, played_alike
 from tdacoustic.reporting.sections.folding import chosen
 from tdacoustic.reporting.sections.order_figures import order_words
-from tdacoustic.reporting.sections.words import condition_words, joined, slug
+from tdacoustic.reporting.sections.words import condition_words, joined, slug, source_word
 from tdacoustic.reporting.sound_strip import SHOWN_DB, strip_of
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
@@ -109,13 +109,13 @@ def _whose(analysis: Analysis, found: Listening) -> list[Block]:
 def _gain_words(full_scale_db: float) -> str:
     return say(
         "All are played with one gain, so that loudness compares from condition to condition: "
-        "full scale is a peak of {full_scale_db:.0f} dB re 20 µPa, and a sine of "
-        "{full_scale_db_2:.0f} dB would reach it. Set the volume once, at the loudest, and leave "
+        "full scale is a peak of {peak:.0f} dB re 20 µPa, and a sine of "
+        "{sine:.0f} dB would reach it. Set the volume once, at the loudest, and leave "
         "it. In the pictures the order lies between the dashed lines; their colours span "
-        "{shown_db:.0f} dB.",
-        full_scale_db=full_scale_db,
-        full_scale_db_2=full_scale_db - 3.0,
-        shown_db=SHOWN_DB,
+        "{span:.0f} dB.",
+        peak=full_scale_db,
+        sine=full_scale_db - 3.0,
+        span=SHOWN_DB,
     )
 
 
@@ -160,22 +160,22 @@ def _sound(analysis: Analysis, sound: ConditionSound, raised_db: float, mp3: Seq
         SoundTrack(
             say("As recorded"),
             mp3[0],
-            say("{level:.1f} dB re 20 µPa, up to {highest_hz:.0f} Hz", level=level, highest_hz=excerpt.highest_hz),
+            say("{level:.1f} dB re 20 µPa, up to {highest:.0f} Hz", level=level, highest=excerpt.highest_hz),
         )
     ]
     if len(mp3) > 1 and excerpt.order is not None:
         own = _level(excerpt.order.rms)
-        by = (
-            say(", played {raised_db:.0f} dB louder than the others", raised_db=raised_db)
+        gain = (
+            say("{level:.1f} dB re 20 µPa, played {raised:.0f} dB louder than the others", level=own, raised=raised_db)
             if raised_db
-            else say(", with the same gain")
+            else say("{level:.1f} dB re 20 µPa, with the same gain", level=own)
         )
-        tracks.append(SoundTrack(say("{name} alone", name=name), mp3[1], f"{own:.1f} dB re 20 µPa{by}"))
+        tracks.append(SoundTrack(say("{order} alone", order=name), mp3[1], gain))
         tracks.append(
             SoundTrack(
-                say("{name} off and on", name=name),
+                say("{order} off and on", order=name),
                 mp3[2],
-                say("as recorded, without it every other {switched_s:.0f} s", switched_s=SWITCHED_S),
+                say("as recorded, without it every other {period:.0f} s", period=SWITCHED_S),
             )
         )
     order = excerpt.order
@@ -212,17 +212,21 @@ def _caption(sound: ConditionSound) -> str:
     last = excerpt.first_s + excerpt.duration_s
     parts = [
         say(
-            "Run {run}, {channel}, {first_s:.2f} to {last:.2f} s.",
+            "Run {run}, {channel}, {start:.2f} to {end:.2f} s.",
             run=sound.run,
             channel=excerpt.channel,
-            first_s=excerpt.first_s,
-            last=last,
+            start=excerpt.first_s,
+            end=last,
         ),
         _listen_for(sound),
     ]
     if excerpt.n_missing:
         parts.append(
-            say("{n_missing} samples are missing in the log and are silent here.", n_missing=excerpt.n_missing)
+            say_count(
+                "{count} sample is missing in the log and is silent here.",
+                "{count} samples are missing in the log and are silent here.",
+                excerpt.n_missing,
+            )
         )
     if sound.doubts:
         parts.append(say("The checks say of this channel: {doubts}.", doubts="; ".join(sound.doubts)))
@@ -232,28 +236,30 @@ def _caption(sound: ConditionSound) -> str:
 def _listen_for(sound: ConditionSound) -> str:
     marked, order = sound.marked, sound.excerpt.order
     if marked is None:
-        what = say("no order was tracked in it") if sound.sweeps else say("it has no noise line")
-        return say("Nothing is marked: {what}.", what=what)
+        return (
+            say("Nothing is marked: no order was tracked in it.")
+            if sound.sweeps
+            else say("Nothing is marked: it has no noise line.")
+        )
     name = order_words(marked.name, marked.order) if marked.order is not None else marked.name
-    of = say(", given to the {source}", source=marked.source) if marked.source else say(", whose source is not known")
+    whose = (
+        say("{order}, given to the {source}", order=name, source=source_word(marked.source))
+        if marked.source
+        else say("{order}, whose source is not known", order=name)
+    )
     if order is None:
         return say(
-            "Listen for {name}{of}; it could not be extracted: {no_order}.",
-            name=name,
-            of=of,
-            no_order=sound.excerpt.no_order,
+            "Listen for {order}; it could not be extracted: {reason}.", order=whose, reason=sound.excerpt.no_order
         )
     below = _level(sound.excerpt.rms) - _level(order.rms)
-    low = float(np.nanmax(order.frequency_hz, initial=0.0)) < HEADPHONES_HZ
-    small = say(" Small loudspeakers do not play so low a tone: use headphones.") if low else ""
-    return say(
-        "Listen for {name}{of}, {hz}: {below:.1f} dB below the whole sound.{small}",
-        name=name,
-        of=of,
-        hz=_hz_words(order),
+    words = say(
+        "Listen for {order}, {frequency}: {below:.1f} dB below the whole sound.",
+        order=whose,
+        frequency=_hz_words(order),
         below=below,
-        small=small,
     )
+    low = float(np.nanmax(order.frequency_hz, initial=0.0)) < HEADPHONES_HZ
+    return " ".join([words, *([say("Small loudspeakers do not play so low a tone: use headphones.")] if low else [])])
 
 
 def _hz_words(order: ExtractedOrder) -> str:
@@ -262,7 +268,7 @@ def _hz_words(order: ExtractedOrder) -> str:
         return say("frequency not known")
     if np.ptp(known) < 0.02 * known.mean():
         return f"{known.mean():.0f} Hz"
-    return say("{known:.0f} to {known_2:.0f} Hz", known=known[0], known_2=known[-1])
+    return say("{first:.0f} to {last:.0f} Hz", first=known[0], last=known[-1])
 
 
 def _level(rms: float) -> float:
@@ -287,7 +293,7 @@ def _table(analysis: Analysis, found: Listening, raised: Sequence[float]) -> Tab
                 excerpt.duration_s,
                 _level(excerpt.rms),
                 "" if marked is None else marked.name,
-                "" if marked is None else marked.source or say("not known"),
+                "" if marked is None else source_word(marked.source) if marked.source else say("not known"),
                 float(known.min()) if known.size else None,
                 float(known.max()) if known.size else None,
                 None if order is None else _level(order.rms),
@@ -326,7 +332,13 @@ def _left_out(found: Listening) -> list[Block]:
     if not reasons:
         return []
     said = Sentences(
-        [say("Without an excerpt: {names} ({why}).", names=joined(names), why=why) for why, names in reasons.items()]
+        [
+            say("Without an excerpt: {conditions} ({reason}).", conditions=joined(names), reason=why)
+            for why, names in reasons.items()
+        ]
     )
-    many = len(found.left_out)
-    return [said] if many <= MOST_NAMED else [Details(say("{many} conditions without an excerpt", many=many), [said])]
+    count = len(found.left_out)
+    if count <= MOST_NAMED:
+        return [said]
+    folded = say_count("{count} condition without an excerpt", "{count} conditions without an excerpt", count)
+    return [Details(folded, [said])]

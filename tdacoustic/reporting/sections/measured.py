@@ -5,7 +5,7 @@ from __future__ import annotations
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Facts, Section, Table
 from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.words import pretty_unit, speed_words
+from tdacoustic.reporting.sections.words import pretty_unit, quantity_word, speed_words
 from tdacoustic.results import Analysis
 
 __all__ = ["measured"]
@@ -30,7 +30,7 @@ def _runs(analysis: Analysis) -> Table:
     for run in analysis.runs:
         state = say("left out")
         if run.measurement is not None:
-            state = "steady" if run.measurement.steady else "run-up"
+            state = say("steady") if run.measurement.steady else say("run-up")
         duration = max((c.duration_s for c in run.recording.channels), default=None) if run.recording else None
         rows.append(
             (
@@ -72,7 +72,7 @@ def _channels(analysis: Analysis) -> Table:
         rows.append(
             (
                 stated.name,
-                (used.quantity if used else stated.quantity or "").replace("_", " "),
+                quantity_word(used.quantity if used else stated.quantity or ""),
                 " ".join(word for word in place if word),
                 stated.distance_m,
                 used.sample_rate_hz if used else None,

@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from typing import Final
 
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.reporting.document import Block, Column, Paragraph, Section, Table
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.words import measured_channels, tested_runs
+from tdacoustic.reporting.language import say
+from tdacoustic.reporting.sections.folding import few
+from tdacoustic.reporting.sections.words import SHAFT_WORDS, measured_channels, tested_runs
+from tdacoustic.reporting.shown import range_text
 from tdacoustic.results import Analysis
 
 __all__ = ["method_of_measurement"]
 
-WINDOW: Final = mark("Hann")
+WINDOW: Final = "Hann"
 """Of all averaged spectra (`tdacoustic.spectra`)."""
+MOST_NAMED: Final = 8
+"""Runs and channels named one by one."""
 
 Row = tuple[str | float | None, ...]
 
@@ -45,28 +49,29 @@ def _spectra(analysis: Analysis) -> list[Block]:
         Column("band_hz", say("Level band"), "Hz"),
     )
     overlap = analysis.settings.get("analysis.overlap")
-    caption = say("Averaged spectra as they were made")
-    caption += (
-        say("; frames overlap by {overlap:.3g} %", overlap=100.0 * overlap) if isinstance(overlap, int | float) else ""
+    caption = (
+        say("Averaged spectra as they were made; frames overlap by {overlap:.3g} %.", overlap=100.0 * overlap)
+        if isinstance(overlap, int | float)
+        else say("Averaged spectra as they were made.")
     )
-    return [Table("spectra-as-made", caption + ".", columns, [(of, *row) for row, of in found])]
+    return [Table("spectra-as-made", caption, columns, [(of, *row) for row, of in found])]
 
 
 def _frames(run: MeasuredRun) -> Iterator[tuple[tuple[str, str], Row]]:
     for channel, result in measured_channels(run):
         spectrum = result.spectrum
         if spectrum is not None:
-            band = " to ".join(f"{limit:.6g}" for limit in result.level_band_hz)
+            lowest, highest = (f"{limit:.6g}" for limit in result.level_band_hz)
             yield (
                 (run.name, channel.name),
                 (
                     channel.sample_rate_hz,
-                    say(WINDOW),
+                    WINDOW,
                     spectrum.duration_s,
                     spectrum.resolution_hz,
                     spectrum.noise_bandwidth_hz,
                     round(spectrum.averages, 1),
-                    band,
+                    range_text(lowest, highest),
                 ),
             )
 
@@ -76,7 +81,7 @@ def _orders(analysis: Analysis) -> list[Block]:
     rows: list[Row] = [
         (
             name,
-            found.shaft or say("not named"),
+            say(SHAFT_WORDS.get(found.shaft, found.shaft)) if found.shaft else say("not named"),
             found.speed_source,
             60.0 * found.lowest_hz,
             60.0 * found.highest_hz,
@@ -93,7 +98,7 @@ def _orders(analysis: Analysis) -> list[Block]:
         Column("speed_source", say("Told by")),
         Column("lowest_rpm", say("Slowest"), "rpm", 1, "number"),
         Column("highest_rpm", say("Fastest"), "rpm", 1, "number"),
-        Column("bandwidth", say("Bandwidth"), "orders", 3, "number"),
+        Column("bandwidth", say("Bandwidth"), say("orders"), 3, "number"),
         Column("highest_order", say("Highest order"), "", 1, "number"),
     )
     text = say("Orders are cut from the signals resampled to even steps of a shaft's angle.")
@@ -113,10 +118,6 @@ def _named(runs: dict[str, list[str]]) -> str:
     for run, channels in runs.items():
         by_channels.setdefault(tuple(channels), []).append(run)
     return "; ".join(
-        say("run {few}: {few_2}", few=_few(names), few_2=_few(channels)) for channels, names in by_channels.items()
+        say("run {runs}: {channels}", runs=few(names, MOST_NAMED), channels=few(channels, MOST_NAMED))
+        for channels, names in by_channels.items()
     )
-
-
-def _few(names: Sequence[str], most: int = 8) -> str:
-    shown = ", ".join(names[:most])
-    return shown if len(names) <= most else say("{shown} and {most} more", shown=shown, most=len(names) - most)

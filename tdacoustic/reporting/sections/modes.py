@@ -21,9 +21,10 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.folding import in_sight
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.folding import in_sight, rows_words
 from tdacoustic.reporting.sections.words import joined, slug
+from tdacoustic.reporting.shown import range_text
 from tdacoustic.results import Analysis
 from tdacoustic.tables.contributions import power_db
 
@@ -36,6 +37,12 @@ VERDICTS: Final = {
     "torque": mark("most of it depends on the torque"),
     "speed": mark("most of it is there without torque"),
     "undecided": mark("not decided"),
+}
+MODE_WORDS: Final = {
+    "traction": mark("traction"),
+    "brake": mark("brake"),
+    "coast": mark("coast"),
+    "hauled": mark("hauled"),
 }
 METHOD = mark(
     "At one speed wheel and rail, fans on the shaft and windage go on while the drive coasts; the motor's forces, the "
@@ -60,18 +67,20 @@ def modes(analysis: Analysis) -> Section | None:
     blocks += (
         figures
         if len(figures) <= IN_SIGHT
-        else [Details(say("Bands at {n_figures} speeds", n_figures=len(figures)), figures)]
+        else [Details(say_count("Bands at {count} speed", "Bands at {count} speeds", len(figures)), figures)]
     )
     blocks.append(in_sight(_table(analysis, compared, of_bands=False), say("All bands together")))
     of_bands = _table(analysis, compared, of_bands=True)
-    blocks.append(Details(say("Band by band, {n_rows} rows", n_rows=len(of_bands.rows)), [of_bands]))
+    blocks.append(Details(rows_words(say("Band by band"), len(of_bands.rows)), [of_bands]))
     doubts = list(dict.fromkeys(d for item in compared if item.comparison is not None for d in item.comparison.doubts))
     blocks += [Sentences([f"{doubt[0].upper()}{doubt[1:]}." for doubt in doubts])] if doubts else []
     return Section("modes", say("What comes and goes with the torque"), [*blocks, Paragraph(say(METHOD))])
 
 
 def _speed_words(item: SpeedModes) -> str:
-    return f"{item.speed:.3g} km/h" if item.unit == "km/h" else say("motor {speed:.4g} rpm", speed=60.0 * item.speed)
+    if item.unit == "km/h":
+        return f"{item.speed:.3g} km/h"
+    return say("motor {speed:.4g} rpm", speed=60.0 * item.speed)
 
 
 def _answer(items: Sequence[SpeedModes]) -> list[Block]:
@@ -80,10 +89,12 @@ def _answer(items: Sequence[SpeedModes]) -> list[Block]:
     if len(sentences) <= IN_SIGHT:
         return [Sentences(sentences)]
     said = [sentence for mode in _modes(items) for sentence in _over_speeds(items, mode)]
-    return [
-        Sentences(said),
-        Details(say("Speed by speed, {n_sentences} sentences", n_sentences=len(sentences)), [Sentences(sentences)]),
-    ]
+    folded = say_count("Speed by speed, {count} sentence", "Speed by speed, {count} sentences", len(sentences))
+    return [Sentences(said), Details(folded, [Sentences(sentences)])]
+
+
+def _mode_word(mode: str) -> str:
+    return say(MODE_WORDS.get(mode, mode))
 
 
 def _modes(items: Sequence[SpeedModes]) -> list[str]:
@@ -97,27 +108,7 @@ def _over_speeds(items: Sequence[SpeedModes], mode: str) -> list[str]:
     for item, parts in held:
         for part in _totals(parts):
             found.setdefault(part.depends_on, []).append((item, part))
-    said = []
-    for depends_on, group in found.items():
-        shares = [part.torque_share for _, part in group]
-        ends = [_speed_words(item) for item, _ in (group[0], group[-1])]
-        where = (
-            say("at {ends}", ends=ends[0])
-            if len(group) == 1
-            else say("at {n_group} speeds, {ends} to {ends_2}", n_group=len(group), ends=ends[0], ends_2=ends[1])
-        )
-        share = " to ".join(dict.fromkeys(f"{100.0 * end:.0f}" for end in (min(shares), max(shares))))
-        verdict = say(VERDICTS.get(depends_on, depends_on))
-        said.append(
-            say(
-                "{mode} at {channel}, {where}: {verdict}, {share} % of the sound comes with the torque",
-                mode=mode,
-                channel=held[0][0].channel,
-                where=where,
-                verdict=verdict,
-                share=share,
-            )
-        )
+    said = [_share_words(mode, depends_on, group) for depends_on, group in found.items()]
     bands: dict[str, int] = {}
     for _, parts in held:
         for part in parts:
@@ -127,12 +118,39 @@ def _over_speeds(items: Sequence[SpeedModes], mode: str) -> list[str]:
         say("{band} at {count}", band=band, count=count)
         for band, count in sorted(bands.items(), key=lambda entry: -entry[1])[:NAMED_BANDS]
     ]
-    end = (
-        say("; most of the band comes with it in {often} of {n_held} speeds", often=joined(often), n_held=len(held))
-        if often
-        else ""
+    if said and often:
+        of_bands = say(
+            "most of the band comes with it in {bands} of {speeds} speeds", bands=joined(often), speeds=len(held)
+        )
+        said[0] = f"{said[0]}; {of_bands}"
+    return [f"{text[0].upper()}{text[1:]}." for text in said]
+
+
+def _share_words(mode: str, depends_on: str, group: Sequence[tuple[SpeedModes, ModePart]]) -> str:
+    """What a mode's sound depends on alike at some speeds, and how much of it comes with the torque."""
+    shares = [part.torque_share for _, part in group]
+    least, most = (f"{100.0 * end:.0f}" for end in (min(shares), max(shares)))
+    first, last = (item for item, _ in (group[0], group[-1]))
+    verdict = say(VERDICTS.get(depends_on, depends_on))
+    share = least if least == most else range_text(least, most)
+    if len(group) == 1:
+        return say(
+            "{mode} at {channel}, at {speed}: {verdict}, {share} % of the sound comes with the torque",
+            mode=_mode_word(mode),
+            channel=first.channel,
+            speed=_speed_words(first),
+            verdict=verdict,
+            share=share,
+        )
+    return say(
+        "{mode} at {channel}, at {count} speeds, {speeds}: {verdict}, {share} % of the sound comes with the torque",
+        mode=_mode_word(mode),
+        channel=first.channel,
+        count=len(group),
+        speeds=range_text(_speed_words(first), _speed_words(last)),
+        verdict=verdict,
+        share=share,
     )
-    return [f"{text[0].upper()}{text[1:]}{end if n == 0 else ''}." for n, text in enumerate(said)]
 
 
 def _of_mode(item: SpeedModes, mode: str) -> list[ModePart]:
@@ -142,22 +160,27 @@ def _of_mode(item: SpeedModes, mode: str) -> list[ModePart]:
 def _sentence(item: SpeedModes) -> str:
     held = say("{speed} at {channel}", speed=_speed_words(item), channel=item.channel)
     if item.comparison is None:
-        return say("{held}: not compared, {reason}.", held=held, reason=item.reason)
+        return say("{place}: not compared, {reason}.", place=held, reason=item.reason)
     said = []
     for part in _totals(item.comparison.parts):
         loaded, free = power_db(part.mean_square), power_db(part.speed_part)
-        levels = (
-            ""
+        mode = _mode_word(part.mode)
+        clauses = (
+            [f"{mode} {part.words}"]
             if loaded is None or free is None
-            else say("{loaded:.1f} dB against {free:.1f} dB without torque; ", loaded=loaded, free=free)
+            else [
+                say("{mode} {loaded:.1f} dB against {free:.1f} dB without torque", mode=mode, loaded=loaded, free=free),
+                part.words,
+            ]
         )
         own = [p.band for p in _of_mode(item, part.mode) if p.band != "total" and p.depends_on == "torque"]
-        bands = (
-            say("; most of it in the band{value} {own}", value="s" if len(own) > 1 else "", own=joined(own))
-            if own
-            else ""
-        )
-        said.append(f"{part.mode} {levels}{part.words}{bands}")
+        if own:
+            clauses.append(
+                say_count(
+                    "most of it in the band {bands}", "most of it in the bands {bands}", len(own), bands=joined(own)
+                )
+            )
+        said.append("; ".join(clauses))
     return f"{held}: {'. '.join(f'{text[0].upper()}{text[1:]}' if n else text for n, text in enumerate(said))}."
 
 
@@ -175,8 +198,8 @@ def _figure(item: SpeedModes) -> Figure:
     bars = [Bars(bands, _levels([of_first[band].speed_part for band in bands]), say("without torque"), color=7)]
     for number, mode in enumerate(loaded):
         held = {part.band: part for part in parts if part.mode == mode}
-        bars.append(Bars(bands, _levels([held[band].mean_square for band in bands]), mode, color=number))
-    runs = joined([f"{mode} {run}" for mode, run in item.runs])
+        bars.append(Bars(bands, _levels([held[band].mean_square for band in bands]), _mode_word(mode), color=number))
+    runs = joined([f"{_mode_word(mode)} {run}" for mode, run in item.runs])
     return Figure(
         slug("modes", item.channel, f"{item.speed:.4g}"),
         say("Bands with and without torque at {speed}, {channel}", speed=_speed_words(item), channel=item.channel),
@@ -220,20 +243,18 @@ def _table(analysis: Analysis, compared: Sequence[SpeedModes], of_bands: bool) -
                 (
                     _speed_words(item),
                     item.channel,
-                    "all" if part.band == "total" else part.band,
+                    say("all") if part.band == "total" else part.band,
                     part.mode,
                     power_db(part.mean_square),
                     power_db(part.speed_part),
                     100.0 * part.torque_share,
-                    say(
-                        "{share_low:.0f} to {share_high:.0f}",
-                        share_low=100.0 * part.share_low,
-                        share_high=100.0 * part.share_high,
-                    ),
+                    range_text(f"{100.0 * part.share_low:.0f}", f"{100.0 * part.share_high:.0f}"),
                     part.depends_on,
                 )
             )
-    title = say(
-        "What comes and goes with the torque{value} (levels re 20 µPa)", value=say(", band by band") if of_bands else ""
+    title = (
+        say("What comes and goes with the torque, band by band (levels re 20 µPa)")
+        if of_bands
+        else say("What comes and goes with the torque (levels re 20 µPa)")
     )
     return Table("modes-of-bands" if of_bands else "modes", title, columns, rows, origin=analysis.campaign.origin)

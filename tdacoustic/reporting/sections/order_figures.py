@@ -14,7 +14,7 @@ from tdacoustic.orders import FixedFrequency
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line, Markers
 from tdacoustic.reporting.language import say, say_count
-from tdacoustic.reporting.sections.words import joined, pretty_unit, slug, source_word
+from tdacoustic.reporting.sections.words import SHAFT_WORDS, joined, pretty_unit, slug
 from tdacoustic.units import REFERENCES, reference_label
 
 __all__ = [
@@ -41,7 +41,7 @@ OFTEN: Final = 0.15
 def shaft_words(orders: RunOrders) -> str:
     """Name of the reference shaft."""
     return (
-        say("{shaft} shaft", shaft=source_word(orders.shaft))
+        say("{shaft} shaft", shaft=say(SHAFT_WORDS.get(orders.shaft, orders.shaft)))
         if orders.shaft
         else say("shaft of {channel}", channel=orders.speed_source)
     )
@@ -220,7 +220,7 @@ def average_figure(run: str, channel: Channel, average: Average) -> Figure:
     residual = math.sqrt(average.residual_mean_square)
     synchronous = float(np.sqrt(np.mean((average.waveform - average.waveform.mean()) ** 2)))
     unit, error_words = pretty_unit(channel.si_symbol), say("± standard error")
-    shaft = source_word(average.shaft)
+    shaft = say(SHAFT_WORDS.get(average.shaft, average.shaft))
     return Figure(
         slug("synchronous", run, channel.name, average.shaft),
         say(

@@ -121,21 +121,23 @@ def _resonance_words(found: RunOrders, item: FixedFrequency, names: Sequence[str
         if found.lowest_hz < item.frequency_hz / order.order < found.highest_hz
     ]
     orders = joined(passing[:4])
-    told = {
-        "frequency": item.frequency_hz,
-        "rise": item.rise_db,
-        "channels": _surest(names),
-        "orders": say("{orders} and others", orders=orders) if len(passing) > 4 else orders,
-    }
+    orders = say("{orders} and others", orders=orders) if len(passing) > 4 else orders
     if item.loss_factor > 0:
         return say(
             "A resonance near {frequency:.0f} Hz, {width:.0f} Hz wide at most raises what passes it by {rise:.0f} dB "
             "in {channels}: {orders}.",
+            frequency=item.frequency_hz,
             width=item.loss_factor * item.frequency_hz,
-            **told,
+            rise=item.rise_db,
+            channels=_surest(names),
+            orders=orders,
         )
     return say(
-        "A resonance near {frequency:.0f} Hz raises what passes it by {rise:.0f} dB in {channels}: {orders}.", **told
+        "A resonance near {frequency:.0f} Hz raises what passes it by {rise:.0f} dB in {channels}: {orders}.",
+        frequency=item.frequency_hz,
+        rise=item.rise_db,
+        channels=_surest(names),
+        orders=orders,
     )
 
 

@@ -240,7 +240,8 @@ def _share_words(shares: Sequence[tuple[float, str, str]], shaft: str) -> str:
             shaft=shaft,
         )
     )
-    return f"{repeats} {say('The rest is what does not follow the shaft.')}"
+    rest = say("The rest is what does not follow the shaft.")
+    return f"{repeats} {rest}"
 
 
 # ------------------------------------------------------------ sidebands

@@ -19,7 +19,8 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.gear_words import begun_large
 from tdacoustic.reporting.sections.printed import is_of_the_paper
 from tdacoustic.results import FleetPrediction
 from tdacoustic.studies import QUANTITIES, FeatureCheck, ReferenceCheck
@@ -28,7 +29,24 @@ from tdacoustic.studies.words import difference_words, feature_words, margin_wor
 
 __all__ = ["features_words", "judged_words", "paper_features"]
 
-QUOTES: Final = ("\N{LEFT DOUBLE QUOTATION MARK}", "\N{RIGHT DOUBLE QUOTATION MARK}")
+METHOD: Final = mark(
+    "Numbers and features that the fleet file states of another source. A margin is by how much a feature is there "
+    "(below zero: by how much it is missing), in dB, in degrees of a direction, or in correlation; amplitudes count as "
+    "20 lg. Up to a feature's tolerance (0.5 dB of a shape where the file says nothing) values count as level: a rise "
+    "or fall with a larger dip in it is none. A number is reproduced where the model is within the tolerance. What a "
+    "margin or a difference depends on is its slope, told for 10 % more of an assumed parameter, or 1 dB more of a "
+    "level."
+)
+MOVED: Final = mark(
+    "Each assumed parameter alone was also moved to {count} values from {low:.2g} to {high:g} times its own "
+    "(±{level:g} dB of a level), to see whether it alone could turn the verdict; between two such values the place is "
+    "interpolated."
+)
+MOVED_WITH_HOUSING: Final = mark(
+    "Each assumed parameter alone, of those that need no new transfer vectors, was also moved to {count} values from "
+    "{low:.2g} to {high:g} times its own (±{level:g} dB of a level), to see whether it alone could turn the verdict; "
+    "between two such values the place is interpolated."
+)
 _UNITS: Final = {"db": "dB", "um": "µm", "n": "N", "hz": "Hz", "deg": "°"}
 
 
@@ -40,7 +58,7 @@ def paper_features(result: FleetPrediction) -> Section | None:
     blocks: list[Block] = [Paragraph(_method(result))]
     if features:
         blocks.append(
-            Paragraph(say("Of {n_features} features {count}.", n_features=len(features), count=_count(features)))
+            Paragraph(say("Of {count} features {verdicts}.", count=len(features), verdicts=_counted(features)))
         )
         words = [feature_words(check, result.fleet) for check in features]
         blocks.append(Sentences([one.statement for one in words]))
@@ -49,7 +67,7 @@ def paper_features(result: FleetPrediction) -> Section | None:
         blocks.append(Details(say("Margins of the features, and what they depend on"), inside))
     if references:
         blocks.append(
-            Paragraph(say("Of {n_references} numbers {count}.", n_references=len(references), count=_count(references)))
+            Paragraph(say("Of {count} numbers {verdicts}.", count=len(references), verdicts=_counted(references)))
         )
         blocks += [FigureBlock(figure, "calculated") for figure in _figures(result)]
         blocks.append(_reference_table(result))
@@ -71,15 +89,11 @@ def features_words(result: FleetPrediction) -> str:
     features = result.studies.features
     if not features:
         return ""
-    of_whom = say("of the paper") if is_of_the_paper(result.fleet) else say("of another source")
-    parts = [
-        say(
-            "of {n_features} features {of_whom} {count}",
-            n_features=len(features),
-            of_whom=of_whom,
-            count=_count(features),
-        )
-    ]
+    count, verdicts = len(features), _counted(features)
+    if is_of_the_paper(result.fleet):
+        parts = [say("of {count} features of the paper {verdicts}", count=count, verdicts=verdicts)]
+    else:
+        parts = [say("of {count} features of another source {verdicts}", count=count, verdicts=verdicts)]
     for holds, lead in ((False, say("not reproduced")), (None, say("not determined"))):
         names = [check.feature.label for check in features if check.holds is holds]
         parts += [f"{lead}: {', '.join(names)}"] if names else []
@@ -102,51 +116,40 @@ def judged_words(result: FleetPrediction, quantities: tuple[str, ...]) -> str:
     for check in held:
         named.setdefault(_verdict(check.holds), []).append(check.feature.label)
     parts = [f"{verdict}: {', '.join(labels)}" for verdict, labels in named.items()]
-    section = f"{QUOTES[0]}{_title(result)}{QUOTES[1]}"
     return say(
-        "features of another source, as judged in the section {section}: {parts}",
-        section=section,
-        parts="; ".join(parts),
+        "features of another source, as judged in the section "
+        "\N{LEFT DOUBLE QUOTATION MARK}{section}\N{RIGHT DOUBLE QUOTATION MARK}: {verdicts}",
+        section=_title(result),
+        verdicts="; ".join(parts),
     )
 
 
 def _method(result: FleetPrediction) -> str:
     low, high = SCAN_FACTORS[0], SCAN_FACTORS[-1]
-    vectors = say(" of those that need no new transfer vectors") if result.prediction.housing is not None else ""
-    return say(
-        "Numbers and features that the fleet file states of another source. A margin is by how "
-        "much a feature is there (below zero: by how much it is missing), in dB, in degrees of a "
-        "direction, or in correlation; amplitudes count as 20 lg. Up to a feature's tolerance "
-        "(0.5 dB of a shape where the file says nothing) values count as level: a rise or fall "
-        "with a larger dip in it is none. A number is reproduced where the model is within the "
-        "tolerance. What a margin or a difference depends on is its slope, told for 10 % more of "
-        "an assumed parameter, or 1 dB more of a level. Each assumed parameter alone{vectors} "
-        "was also moved to {n_scan_factors} values from {low:.2g} to {high:g} times its own "
-        "(±{scan_db:g} dB of a level), to see whether it alone could turn the verdict; between "
-        "two such values the place is interpolated.",
-        vectors="," + vectors + "," if vectors else "",
-        n_scan_factors=len(SCAN_FACTORS),
+    moved = say(
+        MOVED if result.prediction.housing is None else MOVED_WITH_HOUSING,
+        count=len(SCAN_FACTORS),
         low=low,
         high=high,
-        scan_db=SCAN_DB[-1],
+        level=SCAN_DB[-1],
     )
+    return f"{say(METHOD)} {moved}"
 
 
-def _count(checks: tuple[FeatureCheck, ...] | tuple[ReferenceCheck, ...]) -> str:
+def _counted(checks: tuple[FeatureCheck, ...] | tuple[ReferenceCheck, ...]) -> str:
+    """How many are reproduced and how many not."""
     verdicts = [check.holds for check in checks]
-    there, missing, open_ = verdicts.count(True), verdicts.count(False), verdicts.count(None)
-    text = say(
-        "{there} {value} reproduced, {missing} {value_2} not",
-        there=there,
-        value="is" if there == 1 else "are",
-        missing=missing,
-        value_2="is" if missing == 1 else "are",
-    )
-    return text + (say(", and {open} cannot be said", open=open_) if open_ else "")
+    parts = [
+        say_count("{count} is reproduced", "{count} are reproduced", verdicts.count(True)),
+        say_count("{count} is not", "{count} are not", verdicts.count(False)),
+    ]
+    if None in verdicts:
+        parts.append(say("and {count} cannot be said", count=verdicts.count(None)))
+    return ", ".join(parts)
 
 
 def _verdict(holds: bool | None) -> str:
-    return say("not determined") if holds is None else "reproduced" if holds else say("not reproduced")
+    return say("not determined") if holds is None else say("reproduced") if holds else say("not reproduced")
 
 
 def _feature_table(result: FleetPrediction) -> Table:
@@ -175,21 +178,27 @@ def _reference_table(result: FleetPrediction) -> Table:
     rows: list[list[Cell]] = []
     for check in result.studies.references:
         held = check.reference
-        names = held.condition or ()
-        where = (
-            say("condition {names}", names=" or ".join(names))
-            if names
-            else say("helix angle {helix_angle_deg:g}°", helix_angle_deg=held.helix_angle_deg)
-        )
-        if len(names) > 1 and check.case is not None:
-            where += say(" (here {name})", name=check.case.name)
-        quantity = quantity_words(held.quantity, result.fleet)
-        number = f"{quantity[:1].upper()}{quantity[1:]}, {where}{', measured' if held.kind == 'measured' else ''}"
+        number = [begun_large(quantity_words(held.quantity, result.fleet)), _where(check)]
+        if held.kind == "measured":
+            number.append(say("measured"))
         unit = _UNITS[held.quantity.rpartition("_")[2]]
         value = None if math.isnan(check.value) else float(f"{check.value:.4g}")
         off = difference_words(check)
-        rows.append([number, unit, held.value, value, off, _verdict(check.holds), held.origin])
+        rows.append([", ".join(number), unit, held.value, value, off, _verdict(check.holds), held.origin])
     return Table("reference-numbers", say("Numbers of another source and the model's"), columns, rows)
+
+
+def _where(check: ReferenceCheck) -> str:
+    """The condition or the helix angle that a number is of."""
+    names = check.reference.condition
+    if not names:
+        return say("helix angle {angle:g}°", angle=check.reference.helix_angle_deg)
+    either = names[0]
+    for name in names[1:]:
+        either = say("{one} or {other}", one=either, other=name)
+    if len(names) > 1 and check.case is not None:
+        return say("condition {names} (here {name})", names=either, name=check.case.name)
+    return say("condition {names}", names=either)
 
 
 def _figures(result: FleetPrediction) -> list[Figure]:
@@ -223,14 +232,14 @@ def _figure(result: FleetPrediction, quantity: str, checks: list[ReferenceCheck]
             symbol = "diamond" if kind == "model" else "square"
             elements.append(Markers(at, values, name, texts=texts, symbol=symbol, color=slot))  # type: ignore[arg-type]
     words, unit = quantity_words(quantity, result.fleet), _UNITS[quantity.rpartition("_")[2]]
-    label = f"{words[:1].upper()}{words[1:]}"
+    label = begun_large(words)
     reference = "20 µPa" if quantity.endswith("_db") and quantity != "range_12m_db" else None
     name = f"reference-{quantity.replace('_', '-')}"
     caption = say("Points are numbers of another source, the line is this model.")
     axis = Axis(label, unit, reference=reference)
     return Figure(
         name,
-        say("{label}, printed and of this model", label=label),
+        say("{quantity}, printed and of this model", quantity=label),
         caption,
         Axis(say("Train speed"), "km/h"),
         axis,

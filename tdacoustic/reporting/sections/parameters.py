@@ -92,10 +92,9 @@ def value_words(key: str, value: object) -> str:
     '400 at 0 rpm; 600 at 1000 rpm'
     """
     if isinstance(value, tuple) and value and isinstance(value[0], tuple):
-        speed = "km/h" if key == "operation.torque_table" else "rpm"
+        unit = "km/h" if key == "operation.torque_table" else "rpm"
         return "; ".join(
-            say("{number} at {number_2} {speed}", number=_number(row[1]), number_2=_number(row[0]), speed=speed)
-            for row in value
+            say("{number} at {speed}", number=_number(row[1]), speed=f"{_number(row[0])} {unit}") for row in value
         )
     if isinstance(value, tuple):
         return (" : " if key.endswith(".teeth") else ", ").join(_number(item) for item in value)

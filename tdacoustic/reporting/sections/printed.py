@@ -7,7 +7,6 @@ from typing import Final, NamedTuple
 
 from tdacoustic.drive import GearState
 from tdacoustic.fleet import Fleet
-from tdacoustic.reporting.language import mark
 
 __all__ = [
     "DTE_PP_UM",
@@ -24,7 +23,7 @@ __all__ = [
     "printed_of",
 ]
 
-PAPER: Final = mark("Appl. Sci. 2025, 15, 10597")
+PAPER: Final = "Appl. Sci. 2025, 15, 10597"
 
 
 class Printed(NamedTuple):

@@ -7,21 +7,27 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
-from tdacoustic.reporting.language import say
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.method import method_of_measurement
 from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
 
-__all__ = ["ASSUMPTIONS", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
+__all__ = ["ASSUMPTIONS", "assumptions_said", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
 
 MOST_OF_A_STEP: Final = 200
 """Rows of one step in the page."""
 
 ASSUMPTIONS = (
-    "The channels' components, directions, distances and sensitivities are taken from the campaign file.",
-    "Several logs of one run are taken to start together.",
-    "A run is steady where the 5th and 95th percentile of its speed differ by no more than the tolerance set.",
-    "The limits of the quality checks are assumed; they are named in the finding they lead to.",
+    mark("The channels' components, directions, distances and sensitivities are taken from the campaign file."),
+    mark("Several logs of one run are taken to start together."),
+    mark("A run is steady where the 5th and 95th percentile of its speed differ by no more than the tolerance set."),
+    mark("The limits of the quality checks are assumed; they are named in the finding they lead to."),
 )
+"""On the recordings."""
+
+
+def assumptions_said() -> Sentences:
+    """Return what is assumed of the recordings."""
+    return Sentences([say(assumption) for assumption in ASSUMPTIONS])
 
 
 def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
@@ -30,7 +36,7 @@ def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
         *inputs_of(analysis.inputs),
         settings_of(analysis.settings),
         *method_of_measurement(analysis),
-        Section("assumptions", say("Assumptions"), [Sentences(ASSUMPTIONS)]),
+        Section("assumptions", say("Assumptions"), [assumptions_said()]),
         *behind,
         *steps_of(analysis),
         versions_of(analysis.versions),
@@ -40,7 +46,7 @@ def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
 
 def inputs_of(files: Sequence[LogInput]) -> list[Block]:
     """Return the table of the files that went in; nothing of none."""
-    columns = (Column("file", say("File")), Column("format", say("Format")), Column("sha256", say("SHA-256")))
+    columns = (Column("file", say("File")), Column("format", say("Format")), Column("sha256", "SHA-256"))
     rows = [(file.written, file.format, file.sha256) for file in files]
     return [Table("inputs", say("Inputs"), columns, rows)] if rows else []
 
@@ -59,9 +65,9 @@ def versions_of(versions: Mapping[str, str]) -> Section:
 
 def _shown(value: object) -> str:
     if value is None:
-        return "default"
+        return say("default")
     if isinstance(value, tuple | list):
-        return ", ".join(_shown(item) for item in value) or "none"
+        return ", ".join(_shown(item) for item in value) or say("none")
     if isinstance(value, Mapping):
         return " ".join(f"{key} = {_shown(item)}" for key, item in value.items())
     return f"{value:g}" if isinstance(value, float) else str(value)
@@ -81,7 +87,7 @@ def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]
         if named[record.step] <= MOST_OF_A_STEP:
             rows.append((record.label, record.title, record.step, record.version, key[:16], made_from))
         elif named[record.step] == often[record.step]:
-            more = say("{most_of_a_step} more, see manifest.json", most_of_a_step=often[record.step] - MOST_OF_A_STEP)
+            more = say("{count} more, see manifest.json", count=often[record.step] - MOST_OF_A_STEP)
             rows.append((more, record.title, record.step, record.version, "", ""))
     columns = (
         Column("label", say("Of")),
@@ -92,4 +98,4 @@ def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]
         Column("inputs", say("Made from")),
     )
     table = Table("steps", say("Steps and what they were made from"), columns, rows)
-    return [Details(say("{n_records} steps", n_records=len(result.records)), [table])] if rows else []
+    return [Details(say_count("{count} step", "{count} steps", len(result.records)), [table])] if rows else []

@@ -29,7 +29,7 @@ from tdacoustic.reporting.document import (
     Table,
 )
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Rule
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.sections.folding import in_sight
 from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, slug
@@ -44,12 +44,6 @@ MOST_FIGURES = 8
 MOST_RUNS = 6
 DRAWN_DB = 60.0
 """Below the highest level of a history, what is drawn."""
-
-_STATES = {
-    "met": mark("all requirements met"),
-    "broken": mark("a requirement broken"),
-    "unknown": mark("requirements unknown"),
-}
 
 
 def railway(analysis: Analysis) -> Section | None:
@@ -89,10 +83,10 @@ def railway_words(analysis: Analysis, condition: str) -> str:
     for item in analysis.railway.positions:
         if item.condition == condition and item.decisive and item.repetition.reported_db is not None:
             words = say(
-                "{test} {symbol} = {reported_db} dB at {channel}",
+                "{test} {symbol} = {level} dB at {channel}",
                 test=item.test,
                 symbol=item.symbol,
-                reported_db=item.repetition.reported_db,
+                level=item.repetition.reported_db,
                 channel=item.channel,
             )
             said.setdefault(words, []).append(item.standard)
@@ -106,22 +100,23 @@ def _intro(found: RailwayMeasures) -> str:
             "Nothing is rated: no run that could be measured states its test with a microphone that can be used."
         )
     words = say(
-        "{n_with_level} of {n_quantities} quantities could be had from the runs ({standards}). "
+        "{count} of {all} quantities could be had from the runs ({standards}). "
         "Levels are A-weighted, re 20 µPa, as measured; one that is corrected for background "
         "stands beside. A requirement that nothing in campaign and logs tells of is unknown, not "
         "met.",
-        n_with_level=len(with_level),
-        n_quantities=len(found.quantities),
+        count=len(with_level),
+        all=len(found.quantities),
         standards=", ".join(found.standards),
     )
     doubtful = [name for name in found.standards if not all(rule.verified for rule in STANDARDS[name].rules)]
-    if doubtful:
-        words += say(
-            " Rules of {doubtful} are in part taken over from other editions or from practice "
-            "[not verified against the standard's text]; each says so where it is used.",
-            doubtful=joined(doubtful),
-        )
-    return words
+    if not doubtful:
+        return words
+    taken_over = say(
+        "Rules of {standards} are in part taken over from other editions or from practice "
+        "[not verified against the standard's text]; each says so where it is used.",
+        standards=joined(doubtful),
+    )
+    return f"{words} {taken_over}"
 
 
 # ---------------------------------------------------------------- in words
@@ -147,7 +142,9 @@ def _results(analysis: Analysis, found: RailwayMeasures) -> Iterator[str]:
             key = (item.condition, q.standard, q.test, q.symbol, q.reason or "")
             missing.setdefault(key, []).append(say("{channel} in run {run}", channel=item.channel, run=item.run))
     for (condition, standard, test, symbol, reason), where in missing.items():
-        places = "; ".join(where[:4]) + (say(" and {n_where} more", n_where=len(where) - 4) if len(where) > 4 else "")
+        places = "; ".join(where[:4])
+        if len(where) > 4:
+            places = say("{places} and {count} more", places=places, count=len(where) - 4)
         words = say(
             "{condition}, {test} by {standard}: no {symbol}",
             condition=condition_words(analysis, condition),
@@ -161,36 +158,44 @@ def _results(analysis: Analysis, found: RailwayMeasures) -> Iterator[str]:
 def _of_positions(found: RailwayMeasures, symbol: str, held: Sequence[PositionResult]) -> str:
     best = next((position for position in held if position.decisive), None)
     if best is not None:
-        runs = best.repetition
-        of = (
-            say(" at {channel}, the loudest of {n_held} positions", channel=best.channel, n_held=len(held))
-            if len(held) > 1
-            else say(" at {channel}", channel=best.channel)
-        )
-        said = say(
-            "{symbol} = {reported_db} dB{of} (mean {mean_db:.1f} dB of {n_levels_db} runs, {spread_db:.1f} dB apart)",
-            symbol=symbol,
-            reported_db=runs.reported_db,
-            of=of,
-            mean_db=runs.mean_db,
-            n_levels_db=len(runs.levels_db),
-            spread_db=runs.spread_db,
-        )
-        return f"{said}; {_state_words(found, best)}."
+        return f"{_result_words(symbol, best, len(held))}; {_state_words(found, best)}."
     parts = []
     for position in held:
         runs = position.repetition
-        count = say("{n_levels_db} run", n_levels_db=len(runs.levels_db)) + ("s" if len(runs.levels_db) != 1 else "")
         parts.append(
-            say(
-                "{channel} {mean_db:.1f} dB of {count}, no result: {reason}",
+            say_count(
+                "{channel} {mean:.1f} dB of {count} run, no result: {reason}",
+                "{channel} {mean:.1f} dB of {count} runs, no result: {reason}",
+                len(runs.levels_db),
                 channel=position.channel,
-                mean_db=runs.mean_db,
-                count=count,
+                mean=runs.mean_db,
                 reason=runs.reason,
             )
         )
     return f"{symbol}: {'; '.join(parts)}; {_state_words(found, held[0])}."
+
+
+def _result_words(symbol: str, best: PositionResult, n_positions: int) -> str:
+    """The result at the position that decides, and the runs that it is of."""
+    runs = best.repetition
+    of_runs = say(
+        "mean {mean:.1f} dB of {count} runs, {spread:.1f} dB apart",
+        mean=runs.mean_db,
+        count=len(runs.levels_db),
+        spread=runs.spread_db,
+    )
+    where = (
+        say("{channel}, the loudest of {count} positions", channel=best.channel, count=n_positions)
+        if n_positions > 1
+        else best.channel
+    )
+    return say(
+        "{symbol} = {level} dB at {where} ({of_runs})",
+        symbol=symbol,
+        level=runs.reported_db,
+        where=where,
+        of_runs=of_runs,
+    )
 
 
 def _state_words(found: RailwayMeasures, position: PositionResult) -> str:
@@ -204,9 +209,9 @@ def _state_words(found: RailwayMeasures, position: PositionResult) -> str:
     ]
     broken = list(dict.fromkeys(finding.requirement for finding in findings if finding.state == "broken"))
     unknown = list(dict.fromkeys(finding.requirement for finding in findings if finding.state == "unknown"))
-    parts = [say("broken: {broken}", broken=", ".join(broken))] if broken else []
-    parts += [say("not known: {unknown}", unknown=", ".join(unknown))] if unknown else []
-    return "; ".join(parts) or say(_STATES["met"])
+    parts = [say("broken: {requirements}", requirements=", ".join(broken))] if broken else []
+    parts += [say("not known: {requirements}", requirements=", ".join(unknown))] if unknown else []
+    return "; ".join(parts) or say("all requirements met")
 
 
 def _units(found: RailwayMeasures) -> Iterator[str]:
@@ -217,20 +222,12 @@ def _units(found: RailwayMeasures) -> Iterator[str]:
 def _of_unit(unit: UnitResult) -> str:
     words = say("Condition {condition}, standing unit by {standard}", condition=unit.condition, standard=unit.standard)
     if unit.level_db is None:
-        return say("{words}: no level of the unit: {reason}.", words=words, reason=unit.reason)
-    if unit.reported_db is None:
-        return say(
-            "{words}: {level_db:.1f} dB over its positions, no result: {reason}.",
-            words=words,
-            level_db=unit.level_db,
-            reason=unit.reason,
-        )
-    return say(
-        "{words}: {reported_db} dB over its positions ({level_db:.1f} dB).",
-        words=words,
-        reported_db=unit.reported_db,
-        level_db=unit.level_db,
-    )
+        said = say("no level of the unit: {reason}", reason=unit.reason)
+    elif unit.reported_db is None:
+        said = say("{level:.1f} dB over its positions, no result: {reason}", level=unit.level_db, reason=unit.reason)
+    else:
+        said = say("{rounded} dB over its positions ({level:.1f} dB)", rounded=unit.reported_db, level=unit.level_db)
+    return f"{words}: {said}."
 
 
 # ---------------------------------------------------------------- figures
@@ -258,7 +255,7 @@ def _history(analysis: Analysis, condition: str, test: str, runs: Sequence[RunQu
     passing = test == "pass-by"
     hearing = {} if analysis.tonality is None else analysis.tonality.hearing
     elements: list[Element] = []
-    rules: list[Element] = [Rule(0.0, "front")] if passing else []
+    rules: list[Element] = [Rule(0.0, say("front"))] if passing else []
     for item in runs:
         quantity = item.quantity
         zero = (quantity.start_s or 0.0) if passing else 0.0
@@ -266,13 +263,12 @@ def _history(analysis: Analysis, condition: str, test: str, runs: Sequence[RunQu
         if line is not None:
             elements.append(line)
             if passing and quantity.end_s is not None:
-                rules.append(
-                    Rule(quantity.end_s - zero, "rear" if len(runs) == 1 else say("rear, {run}", run=item.run))
-                )
+                name = say("rear") if len(runs) == 1 else say("rear, {run}", run=item.run)
+                rules.append(Rule(quantity.end_s - zero, name))
     if not elements:
         return None
     first = runs[0]
-    told = ", ".join(say("run {run} {level_db:.1f} dB", run=item.run, level_db=item.quantity.level_db) for item in runs)
+    told = ", ".join(say("run {run} {level:.1f} dB", run=item.run, level=item.quantity.level_db) for item in runs)
     since = say("Time from the passing of the front") if passing else say("Time from the start of the run")
     return Figure(
         slug("level-history", condition, test),
@@ -319,7 +315,7 @@ def _repetition_table(analysis: Analysis, positions: Sequence[PositionResult]) -
         (Column("condition", say("Condition")), lambda p: p.condition),
         (Column("standard", say("Standard")), lambda p: p.standard),
         (Column("test", say("Test")), lambda p: p.test),
-        (Column("channel", say("Microphone")), lambda p: p.channel + (" (decisive)" if p.decisive else "")),
+        (Column("channel", say("Microphone")), _channel_words),
         (Column("symbol", say("Quantity")), lambda p: p.symbol),
         (Column("n_runs", say("Runs"), "", 0, "number"), lambda p: len(p.repetition.levels_db)),
         (Column("mean_db", say("Mean"), "dB", 1, "number"), lambda p: p.repetition.mean_db),
@@ -329,6 +325,10 @@ def _repetition_table(analysis: Analysis, positions: Sequence[PositionResult]) -
         (Column("reason", say("Why no result")), lambda p: p.repetition.reason or ""),
     ]
     return item_table("railway-repetition", say("Repetition"), positions, columns, analysis.campaign.origin)
+
+
+def _channel_words(position: PositionResult) -> str:
+    return say("{channel} (decisive)", channel=position.channel) if position.decisive else position.channel
 
 
 def _quantity_table(analysis: Analysis, quantities: Sequence[RunQuantity]) -> Table:
@@ -350,7 +350,7 @@ def _quantity_table(analysis: Analysis, quantities: Sequence[RunQuantity]) -> Ta
 def _span(quantity: Quantity) -> str:
     if quantity.start_s is None or quantity.end_s is None:
         return ""
-    return say("{start_s:.2f} to {end_s:.2f} s", start_s=quantity.start_s, end_s=quantity.end_s)
+    return say("{start:.2f} to {end:.2f} s", start=quantity.start_s, end=quantity.end_s)
 
 
 def _findings_table(quantities: Sequence[RunQuantity]) -> Table | None:

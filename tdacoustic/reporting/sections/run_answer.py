@@ -60,10 +60,10 @@ def calibration_line(result: CampaignResult) -> str:
     found = result.calibration.calibration
     values = [
         say(
-            "{parameter} {initial:.4g} to {value}",
+            "{parameter} {initial:.4g} to {fitted}",
             parameter=key_words(p.key, found.fleet),
             initial=p.initial,
-            value=quantity_of(p.key, p.value),
+            fitted=quantity_of(p.key, p.value),
         )
         for p in found.parameters
     ]
@@ -72,7 +72,9 @@ def calibration_line(result: CampaignResult) -> str:
     misfit = say("levels off by {before:.1f} dB rms before, {after:.1f} dB after", before=before, after=after)
     doubts = say_count("{count} doubt", "{count} doubts", len(found.doubts))
     return pretty_signs(
-        say("Calibration: {values}; {misfit}; {doubts}.", values=", ".join(values), misfit=misfit, doubts=doubts)
+        say(
+            "Calibration: {parameters}; {misfit}; {doubts}.", parameters=", ".join(values), misfit=misfit, doubts=doubts
+        )
     )
 
 

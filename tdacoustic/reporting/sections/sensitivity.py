@@ -19,7 +19,6 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.gear_words import sentence
 from tdacoustic.reporting.sections.parameters import value_words
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
@@ -32,6 +31,16 @@ __all__ = ["sensitivity"]
 
 MOST_BARS: Final = 10
 _OVER: Final = {"conditions": mark("over the conditions"), "helix": mark("over the helix angles")}
+_CAPTIONS: Final = {
+    ("conditions",): mark(
+        "Slope of the total at {surface}, told for 10 % more; the largest in size over the conditions."
+    ),
+    ("helix",): mark("Slope of the total at {surface}, told for 10 % more; the largest in size over the helix angles."),
+    ("conditions", "helix"): mark(
+        "Slope of the total at {surface}, told for 10 % more; the largest in size over the conditions or over the "
+        "helix angles."
+    ),
+}
 
 
 def sensitivity(result: FleetPrediction) -> Section | None:
@@ -55,27 +64,27 @@ def sensitivity(result: FleetPrediction) -> Section | None:
 def _method(surface: str) -> str:
     return say(
         "Slopes of the level at {surface} when a single parameter moves and all others stay, "
-        "from central differences of ±{step_relative:g} % of the parameter (±{step_db:g} dB of a "
+        "from central differences of ±{percent:g} % of the parameter (±{decibels:g} dB of a "
         "level). What stands for +10 % is ten times what 1 % does, and for +1 dB ten times what "
         "0.1 dB does: linear, not computed with so much more. Near a resonance such a step can "
         "do much more, or the opposite; [[what_if]] and [[sweep]] compute it. Of a table over "
         "speed all rows move together.",
         surface=surface,
-        step_relative=100.0 * STEP_RELATIVE,
-        step_db=STEP_DB,
+        percent=100.0 * STEP_RELATIVE,
+        decibels=STEP_DB,
     )
 
 
 def _rattling_words(found: Sensitivity) -> str:
     told = [
-        say("condition {name}", name=case.name) if case.over == "conditions" else f"{case.name}°"
+        say("condition {condition}", condition=case.name) if case.over == "conditions" else f"{case.name}°"
         for case in found.rattling
     ]
     return say(
-        "At {told} the harmonic balance finds no stable motion when some of the gears' "
+        "At {cases} the harmonic balance finds no stable motion when some of the gears' "
         "parameters move: these changes are left out there, as each would take an integration in "
         "time over seconds.",
-        told=joined(told),
+        cases=joined(told),
     )
 
 
@@ -83,19 +92,17 @@ def _ranking_words(fleet: Fleet, found: Sensitivity, ranking: tuple[int, ...]) -
     strongest = found.strongest("conditions")
     told = [
         say(
-            "{number} ({strongest:+.1f} dB for {per})",
-            number=number_words(found.varied[place].key, fleet),
-            strongest=strongest[place],
-            per=per_words(found.varied[place].kind),
+            "{parameter} ({change:+.1f} dB for {more})",
+            parameter=number_words(found.varied[place].key, fleet),
+            change=strongest[place],
+            more=per_words(found.varied[place].kind),
         )
         for place in ranking[:3]
     ]
     return pretty_signs(
-        sentence(
-            say(
-                "of the assumed parameters the total depends most on {told}: the largest changes over speed",
-                told=joined(told),
-            )
+        say(
+            "Of the assumed parameters the total depends most on {parameters}: the largest changes over speed.",
+            parameters=joined(told),
         )
     )
 
@@ -111,20 +118,12 @@ def _figure(result: FleetPrediction, found: Sensitivity, ranking: tuple[int, ...
     return Figure(
         "sensitivity",
         say("Assumed parameters that the total depends on most"),
-        say(
-            "Slope of the total at {surface}, told for 10 % more; the largest in size {value}.",
-            surface=result.prediction.surface,
-            value=_or(held),
-        ),
+        say(_CAPTIONS[tuple(held)], surface=result.prediction.surface),
         Axis(say("Parameter")),
         Axis(say("Change of the level"), "dB"),
         bars,
         height=460,
     )
-
-
-def _or(held: list[str]) -> str:
-    return " or ".join(say(_OVER[over]) for over in held)
 
 
 def _per(variation: Variation) -> str:
@@ -142,9 +141,9 @@ def _table(result: FleetPrediction, found: Sensitivity) -> Table:
         for case in found.cases:
             if case.over == over:
                 title = (
-                    say("Condition {name}", name=case.name)
+                    say("Condition {condition}", condition=case.name)
                     if over == "conditions"
-                    else say("Helix {name}°", name=case.name)
+                    else say("Helix {angle}°", angle=case.name)
                 )
                 columns.append(Column(f"{over}_{case.name}", title, "dB", 2, "number"))
     columns.append(Column("parameter", say("Key")))
@@ -178,4 +177,5 @@ def _left_out(fleet: Fleet, found: Sensitivity) -> list[Block]:
     order = sorted(by_reason, key=lambda reason: (reason != VECTORS, reason != SILENT, reason))
     rows: list[list[Cell]] = [[number_words(key, fleet), reason, key] for reason in order for key in by_reason[reason]]
     columns = (Column("words", say("Parameter")), Column("reason", say("Why not")), Column("parameter", say("Key")))
-    return [Details(say("Parameters not varied"), [Table("not-varied", say("Parameters not varied"), columns, rows)])]
+    title = say("Parameters not varied")
+    return [Details(title, [Table("not-varied", title, columns, rows)])]

@@ -14,42 +14,52 @@ from tdacoustic.sensors.channel_calibration import ChannelCalibration
 
 __all__ = ["doubtful_channels", "sensors"]
 
-RULE = (
-    f"ISO 3095 and ISO 3381 ask for a check with a calibrator before and after a series of measurements, and do not "
-    f"accept what was measured between two checks that differ by more than {LIMIT_DB:g} dB."
+RULE = mark(
+    "ISO 3095 and ISO 3381 ask for a check with a calibrator before and after a series of measurements, and do not "
+    "accept what was measured between two checks that differ by more than {limit:g} dB."
 )
+_ACTIONS = {"set": mark("set"), "checked": mark("checked"), "reported": mark("as stated")}
 
-_READINGS = (
-    Column("channel", "Channel"),
-    Column("run", "Run"),
-    Column("calibrator", "Calibrator"),
-    Column("frequency_hz", "Frequency", "Hz", 1, "number"),
-    Column("read", "Read", "rms", 4, "number"),
-    Column("unit", "Unit"),
-    Column("deviation_db", "Deviation", "dB", 2, "number"),
-    Column("verdict", "Verdict", kind="verdict"),
-    Column("reason", "Finding"),
-)
-_CHANNELS = (
-    Column("channel", "Channel"),
-    Column("series", "Series", "", 0, "number"),
-    Column("action", "Scale is"),
-    Column("deviation_db", "Deviation", "dB", 2, "number"),
-    Column("drift_db", "Drift", "dB", 2, "number"),
-    Column("sigma_db", "Uncertainty", "dB", 2, "number"),
-    Column("verdict", "Verdict", kind="verdict"),
-    Column("reason", "Finding"),
-)
-_DATABASE = (
-    Column("channel", "Channel"),
-    Column("sensor", "Sensor"),
-    Column("sensitivity_stated", "Sensitivity"),
-    Column("calibrated_on", "Calibrated on"),
-    Column("due_on", "Due on"),
-    Column("scale_from", "Scale from"),
-    Column("verdict", "Verdict", kind="verdict"),
-    Column("reason", "Finding"),
-)
+
+def _of_readings() -> tuple[Column, ...]:
+    return (
+        Column("channel", say("Channel")),
+        Column("run", say("Run")),
+        Column("calibrator", say("Calibrator")),
+        Column("frequency_hz", say("Frequency"), "Hz", 1, "number"),
+        Column("read", say("Read"), "rms", 4, "number"),
+        Column("unit", say("Unit")),
+        Column("deviation_db", say("Deviation"), "dB", 2, "number"),
+        *_findings(),
+    )
+
+
+def _of_channels() -> tuple[Column, ...]:
+    return (
+        Column("channel", say("Channel")),
+        Column("series", say("Series"), "", 0, "number"),
+        Column("action", say("Scale is")),
+        Column("deviation_db", say("Deviation"), "dB", 2, "number"),
+        Column("drift_db", say("Drift"), "dB", 2, "number"),
+        Column("sigma_db", say("Uncertainty"), "dB", 2, "number"),
+        *_findings(),
+    )
+
+
+def _of_database() -> tuple[Column, ...]:
+    return (
+        Column("channel", say("Channel")),
+        Column("sensor", say("Sensor")),
+        Column("sensitivity_stated", say("Sensitivity")),
+        Column("calibrated_on", say("Calibrated on")),
+        Column("due_on", say("Due on")),
+        Column("scale_from", say("Scale from")),
+        *_findings(),
+    )
+
+
+def _findings() -> tuple[Column, ...]:
+    return Column("verdict", say("Verdict"), kind="verdict"), Column("reason", say("Finding"))
 
 
 def doubtful_channels(analysis: Analysis) -> tuple[str, ...]:
@@ -73,33 +83,35 @@ def sensors(analysis: Analysis) -> Section | None:
     if found.calibrations or found.problems:
         blocks.append(Paragraph(pretty_signs(_answer(found.calibrations))))
         doubtful = doubtful_channels(analysis)
+        rule = say(RULE, limit=LIMIT_DB)
         if doubtful:
             text = say(
-                "Levels of {doubtful} are doubtful; they stand marked in the table of levels. {rule}",
-                doubtful=joined(doubtful),
-                rule=RULE,
+                "Levels of {channels} are doubtful; they stand marked in the table of levels.",
+                channels=joined(doubtful),
             )
-            blocks.append(Notice("warning", text))
+            blocks.append(Notice("warning", f"{text} {rule}"))
         else:
-            blocks.append(Paragraph(RULE))
+            blocks.append(Paragraph(rule))
     if found.calibrations:
         origin = analysis.campaign.origin
         held = [_of_channel(item) for item in found.calibrations]
         blocks.append(
-            Table("sensor-scales", say("What calibrators say of each channel"), _CHANNELS, held, origin=origin)
+            Table("sensor-scales", say("What calibrators say of each channel"), _of_channels(), held, origin=origin)
         )
-        read = [_cells(row, _READINGS) for row in rows if str(row["kind"]).startswith("calibration_")]
-        blocks.append(Table("calibrator-readings", say("Readings of calibrators"), _READINGS, read, origin=origin))
+        columns = _of_readings()
+        read = [_cells(row, columns) for row in rows if str(row["kind"]).startswith("calibration_")]
+        blocks.append(Table("calibrator-readings", say("Readings of calibrators"), columns, read, origin=origin))
         blocks.append(Paragraph(say(_METHOD)))
     if found.database:
         table = analysis.campaign.sensor_table
-        name = "" if table is None else f" {table.text}"
-        held = [_cells(row, _DATABASE) for row in rows if row["kind"] == "database"]
-        blocks.append(
-            Table(
-                "sensor-database", say("From the sensor database{name}", name=name), _DATABASE, held, origin="printed"
-            )
+        caption = (
+            say("From the sensor database")
+            if table is None
+            else say("From the sensor database {file}", file=table.text)
         )
+        columns = _of_database()
+        held = [_cells(row, columns) for row in rows if row["kind"] == "database"]
+        blocks.append(Table("sensor-database", caption, columns, held, origin="printed"))
     return Section("sensors", say("Sensors and calibrators"), blocks)
 
 
@@ -124,28 +136,38 @@ def _answer(calibrations: tuple[ChannelCalibration, ...]) -> str:
         worst = max((item for item in calibrations if item.action == "checked"), key=_off)
         parts.append(
             say(
-                "Calibrators check the sensitivity of {checked}: the largest deviation is "
-                "{deviation_db:+.2f} dB ({channel}).",
-                checked=joined(done["checked"]),
-                deviation_db=worst.deviation_db or 0.0,
+                "Calibrators check the sensitivity of {channels}: the largest deviation is {deviation:+.2f} dB "
+                "({channel}).",
+                channels=joined(done["checked"]),
+                deviation=worst.deviation_db or 0.0,
                 channel=worst.channel,
             )
         )
     if done["set"]:
-        who = say("They set that of") if parts else say("Calibrators set the sensitivity of")
-        parts.append(f"{who} {joined(done['set'])}.")
+        channels = joined(done["set"])
+        parts.append(
+            say("They set that of {channels}.", channels=channels)
+            if parts
+            else say("Calibrators set the sensitivity of {channels}.", channels=channels)
+        )
     drifts = [item for item in calibrations if item.drift_db is not None]
     if drifts:
         most = max(drifts, key=lambda item: abs(item.drift_db or 0.0))
-        limit = "more" if abs(most.drift_db or 0.0) > LIMIT_DB else say("no more")
         parts.append(
             say(
-                "Between before and after the largest drift is {drift_db:+.2f} dB ({channel}), "
-                "{limit} than the {limit_db:g} dB that standards allow.",
-                drift_db=most.drift_db,
+                "Between before and after the largest drift is {drift:+.2f} dB ({channel}), more than the {limit:g} dB "
+                "that standards allow.",
+                drift=most.drift_db,
                 channel=most.channel,
-                limit=limit,
-                limit_db=LIMIT_DB,
+                limit=LIMIT_DB,
+            )
+            if abs(most.drift_db or 0.0) > LIMIT_DB
+            else say(
+                "Between before and after the largest drift is {drift:+.2f} dB ({channel}), no more than the "
+                "{limit:g} dB that standards allow.",
+                drift=most.drift_db,
+                channel=most.channel,
+                limit=LIMIT_DB,
             )
         )
     elif parts:
@@ -158,11 +180,10 @@ def _off(item: ChannelCalibration) -> float:
 
 
 def _of_channel(item: ChannelCalibration) -> tuple[Cell, ...]:
-    words = {"set": "set", "checked": "checked", "reported": say("as stated")}
     return (
         item.channel,
         item.series,
-        words[item.action],
+        say(_ACTIONS[item.action]),
         item.deviation_db,
         item.drift_db,
         item.sigma_db,

@@ -16,15 +16,18 @@ from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun, receivers
 from tdacoustic.reporting.document import Block, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule, Symbol
-from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.spectra import density_levels, level_axis, quantity_title
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.gear_words import begun_large
+from tdacoustic.reporting.sections.spectra import density_levels, level_axis
 from tdacoustic.reporting.sections.words import (
     OWNER_SLOT_OTHER,
     OWNER_SLOTS,
     condition_words,
     joined,
     measured_channels,
+    quantity_word,
     slug,
+    source_word,
     tested_runs,
 )
 from tdacoustic.results import Analysis
@@ -138,20 +141,22 @@ class _View:
             return []
         marks = [(n, n * self.kinematics.mesh_hz) for n in range(1, MESH_HARMONICS + 1)]
         low, high = self.limits
-        return [Rule(x, say("mesh x1") if n == 1 else f"x{n}") for n, x in marks if low < x < high]
+        return [Rule(x, "mesh x1" if n == 1 else f"x{n}") for n, x in marks if low < x < high]
 
     def _trace(self, spectrum: Spectrum, name: str) -> list[Element]:
         kept = (spectrum.frequencies_hz >= 0.5 * LOWEST_HZ) & (spectrum.frequencies_hz <= 1.02 * self.limits[1])
         levels = density_levels(spectrum, spectrum.density)
         return [Line(spectrum.frequencies_hz[kept], levels[kept], name, color=7, width=1.0)]
 
-    def _figure(self, what: str, caption: str, result: ChannelResult, elements: Sequence[Element]) -> Figure:
+    def _figure(
+        self, what: str, heading: str, caption: str, result: ChannelResult, elements: Sequence[Element]
+    ) -> Figure:
         assert result.spectrum is not None
         condition = self.run.run.condition or ""
+        quantity = quantity_word(result.spectrum.quantity)
         return Figure(
             slug("beside", condition, what),
-            f"{what.capitalize()}: {quantity_title(result.spectrum.quantity).lower()}, {result.channel}, "
-            f"{condition_words(self.analysis, condition)}",
+            f"{heading}: {quantity}, {result.channel}, {condition_words(self.analysis, condition)}",
             caption,
             Axis(say("Frequency"), "Hz", limits=self.limits),
             self._axis_of(result.spectrum),
@@ -182,7 +187,7 @@ class _View:
                     _markers(
                         [line for _, line in held],
                         "sound_pressure",
-                        say("source {owner}", owner=owner),
+                        say("source {source}", source=source_word(owner)),
                         [_label(line, source.excitation_name) for source, line in held],
                         [_noise_words(source, line) for source, line in held],
                         OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
@@ -191,17 +196,13 @@ class _View:
         known = {evidence.line.frequency_hz for _, evidence in self.noise}
         left = [line for line in result.lines if line.frequency_hz not in known]
         if left:
-            labels = [say("{frequency_hz:.0f} Hz left out", frequency_hz=line.frequency_hz) for line in left]
+            labels = [say("{frequency:.0f} Hz left out", frequency=line.frequency_hz) for line in left]
             texts = [say("left out: see the exclusions")] * len(left)
             elements.append(_markers(left, "sound_pressure", say("left out"), labels, texts, 4, "x"))
-        caption = say(
-            "Receiver {channel}, run {name}. {spacing} {mesh}",
-            channel=result.channel,
-            name=self.run.name,
-            spacing=_spacing(result.spectrum),
-            mesh=self._mesh_words(),
-        )
-        return self._figure("noise", caption, result, [*elements, *self._rules()])
+        shown = say("Receiver {channel}, run {run}.", channel=result.channel, run=self.run.name)
+        said = [shown, _spacing(result.spectrum), self._mesh_words()]
+        caption = " ".join(text for text in said if text)
+        return self._figure("noise", say("Noise"), caption, result, [*elements, *self._rules()])
 
     def _sensor_figure(self, component: str, result: ChannelResult, of: Sequence[str]) -> Figure:
         spectrum = result.spectrum
@@ -218,37 +219,47 @@ class _View:
             if shared:
                 labels = [_label(line, source.excitation_name) for line, source in shared]
                 texts = [
-                    say("{line}; at the noise line {hz}", line=_line_words(line), hz=_hz(source))
+                    say("{line}; at the noise line {frequency}", line=_line_words(line), frequency=_hz(source))
                     for line, source in shared
                 ]
                 slot = OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER)
                 lines = [line for line, _ in shared]
-                elements.append(
-                    _markers(lines, quantity, say("noise line, source {owner}", owner=owner), labels, texts, slot)
-                )
+                name = say("noise line, source {source}", source=source_word(owner))
+                elements.append(_markers(lines, quantity, name, labels, texts, slot))
         low, high = self.limits
         alone = [line for line in result.lines if found[line.frequency_hz] is None and low <= line.frequency_hz <= high]
         if alone:
             names = [self._order_name(line) for line in alone]
             loudest = sorted(range(len(alone)), key=lambda index: -alone[index].prominence_db)[:OTHER_NAMED]
             labels = [_label(alone[i], names[i]) if i in loudest else "" for i in range(len(alone))]
-            texts = [
-                f"{_line_words(line)}; {name or 'no known order'}" for line, name in zip(alone, names, strict=True)
-            ]
+            unknown = say("no known order")
+            texts = [f"{_line_words(line)}; {name or unknown}" for line, name in zip(alone, names, strict=True)]
             elements.append(_markers(alone, quantity, say("line, not in the noise"), labels, texts, 2, "diamond"))
-        missing = [_hz(source) for source, _ in self.noise if source not in found.values()]
-        shows = say("No line is found here at the noise lines {missing}.", missing=joined(missing)) if missing else ""
-        if len(missing) == 1:
-            shows = say("No line is found here at the noise line {missing}.", missing=missing[0])
-        best = say("Sensor {channel}", channel=result.channel) + (
-            say(" of {list}", list=joined(list(of))) if len(of) > 1 else ""
-        )
         return self._figure(
             component,
-            say("{best}, run {name}. {shows}", best=best, name=self.run.name, shows=shows).strip(),
+            begun_large(source_word(component)),
+            self._sensor_words(result, of, [_hz(source) for source, _ in self.noise if source not in found.values()]),
             result,
             [*elements, *self._rules()],
         )
+
+    def _sensor_words(self, result: ChannelResult, of: Sequence[str], missing: Sequence[str]) -> str:
+        """Which sensor of how many is drawn, and at which noise lines it has none."""
+        run, channel = self.run.name, result.channel
+        shown = (
+            say("Sensor {channel} of {channels}, run {run}.", channel=channel, channels=joined(of), run=run)
+            if len(of) > 1
+            else say("Sensor {channel}, run {run}.", channel=channel, run=run)
+        )
+        if not missing:
+            return shown
+        lines = say_count(
+            "No line is found here at the noise line {lines}.",
+            "No line is found here at the noise lines {lines}.",
+            len(missing),
+            lines=joined(missing),
+        )
+        return f"{shown} {lines}"
 
     def _noise_line_at(self, line: SpectralLine, spectrum: Spectrum) -> SourceLine | None:
         """The noise line at the frequency of a sensor's line, within two lines of either spectrum."""
@@ -270,10 +281,10 @@ class _View:
     def _mesh_words(self) -> str:
         if self.kinematics is None:
             return ""
-        speed = "stated" if self.kinematics.motor_hz_stated is not None else "measured"
-        return say(
-            "Mesh calculated from the {speed} speed: {mesh_hz:.1f} Hz.", speed=speed, mesh_hz=self.kinematics.mesh_hz
-        )
+        mesh = self.kinematics.mesh_hz
+        if self.kinematics.motor_hz_stated is not None:
+            return say("Mesh calculated from the stated speed: {frequency:.1f} Hz.", frequency=mesh)
+        return say("Mesh calculated from the measured speed: {frequency:.1f} Hz.", frequency=mesh)
 
 
 def _markers(
@@ -301,27 +312,29 @@ def _hz(source: SourceLine) -> str:
 
 def _line_words(line: SpectralLine) -> str:
     return say(
-        "{frequency_hz:.1f} Hz, {prominence_db:.0f} dB over the floor",
-        frequency_hz=line.frequency_hz,
-        prominence_db=line.prominence_db,
+        "{frequency:.1f} Hz, {prominence:.0f} dB over the floor",
+        frequency=line.frequency_hz,
+        prominence=line.prominence_db,
     )
 
 
 def _noise_words(source: SourceLine, line: SpectralLine) -> str:
     prominence = source.line.component_prominence_db().items()
     sensors = [
-        f"{name} {level:.0f} dB" if math.isfinite(level) else say("{name} no trace", name=name)
+        f"{source_word(name)} {level:.0f} dB"
+        if math.isfinite(level)
+        else say("{component} no trace", component=source_word(name))
         for name, level in prominence
     ]
     words = [
         _line_words(line),
         source.excitation_name or say("no known order"),
-        say("source {source}", source=source.source),
+        say("source {source}", source=source_word(source.source)),
     ]
     if sensors:
         words.append(say("over the floor of the sensors: {sensors}", sensors=", ".join(sensors)))
-    return "\n".join([*words, *(["conflict"] if source.conflict else [])])
+    return "\n".join([*words, *([say("conflict")] if source.conflict else [])])
 
 
 def _spacing(spectrum: Spectrum) -> str:
-    return say("Line spacing {resolution_hz:.3g} Hz.", resolution_hz=spectrum.resolution_hz)
+    return say("Line spacing {spacing:.3g} Hz.", spacing=spectrum.resolution_hz)

@@ -23,16 +23,69 @@ from tdacoustic.reporting.document import (
 from tdacoustic.reporting.figure import Axis, Figure, Line
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.sections.gear_words import conditions_words, sentence
-from tdacoustic.reporting.sections.sound_paths import PATHS, heard_paths, is_added, path_line, total_words
+from tdacoustic.reporting.sections.sound_paths import (
+    PATHS,
+    heard_paths,
+    is_added,
+    path_line,
+    path_word,
+    total_words,
+)
 from tdacoustic.reporting.sections.sound_spectra import sound_spectra
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import FleetPrediction
 
 __all__ = ["sound_field", "sound_words"]
 
+POINTS_IN = {
+    "free": mark("The sources are points in free space; the level is the mean in energy over the sphere."),
+    "half": mark(
+        "The sources are points in the space over rigid ground at the rail; the level is the mean in energy over the "
+        "half sphere."
+    ),
+}
+HOUSING_IN = {
+    "free": mark(
+        "In free space stands the housing, a closed box, computed from {low:.0f} to {high:.0f} Hz; the level is the "
+        "mean in energy over the sphere."
+    ),
+    "half": mark(
+        "In the space over rigid ground at the rail stands the housing, a closed box, computed from {low:.0f} to "
+        "{high:.0f} Hz; the level is the mean in energy over the half sphere."
+    ),
+}
+OF_POINTS = mark(
+    "The bearing forces' way through the housing is not computed. Levels of both sources stand here whether the total "
+    "adds them or not."
+)
 OF_MOTOR = mark("The motor's tones come from the fleet's excitations.")
-OF_MESH = mark("The meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency")
-
+OF_MESH = mark(
+    "The meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency; the housing is "
+    "already in it."
+)
+STRUCTURE = mark(
+    "Structure: the lines of the bearing forces shake the housing at its seats; its modes (finite elements) answer and "
+    "boundary elements give their sound."
+)
+STRUCTURE_WITH_GAIN = mark(
+    "Structure: the lines of the bearing forces shake the housing at its seats; its modes (finite elements) answer and "
+    "boundary elements give their sound, with [model] structure_gain_db = {gain} dB."
+)
+MOTOR = mark(
+    "Motor: the motor's tones come from the fleet's excitations, as point sources beside the rigid housing, which "
+    "scatters them. Their volume flow is held, so that the housing changes their power."
+)
+MESH_OUTSIDE = mark(
+    "Mesh: the meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency, outside of "
+    "the housing. That level is of a gear unit with its housing, so the power of the source is held: the rigid housing "
+    "gives it a direction and nothing else."
+)
+MESH_INSIDE = mark(
+    "Mesh: the meshing noise is Masuda's level at 1 m as a point source, all of it at the mesh frequency, inside of "
+    "the housing. Its volume flow is held; the air inside shakes the walls, and what they radiate is the level of the "
+    "mesh (section Insertion loss of the housing). Its sound power level is that of a point source with the same mean "
+    "level outside."
+)
 OF_POWERS = mark(
     "The sound power level of a tone of the motor is that without the housing beside it; that of a tone of the "
     "structure is that of a point source with the same mean level at {surface}."
@@ -53,15 +106,15 @@ def sound_field(result: FleetPrediction) -> Section:
     spectra = sound_spectra(result)
     blocks += [] if spectra is None else [spectra]
     tones = [
-        (sound.condition, s.path, s.name, s.frequency_hz, s.sound_power_level_db, level)
+        (sound.condition, path_word(s.path), s.name, s.frequency_hz, s.sound_power_level_db, level)
         for sound in prediction.sound
         for s, level in zip(sound.sources, sound.surface_db, strict=True)
     ]
     if tones:
         folded: list[Block] = [_sources(tones, prediction.surface)]
         if prediction.housing is not None:
-            folded.insert(0, Paragraph(say(OF_POWERS).format(surface=prediction.surface)))
-        blocks.append(Details(say("{n_tones} sources", n_tones=len(tones)), folded))
+            folded.insert(0, Paragraph(say(OF_POWERS, surface=prediction.surface)))
+        blocks.append(Details(say("{count} sources", count=len(tones)), folded))
     return Section("sound-field", say("Sound around the drive"), blocks)
 
 
@@ -72,96 +125,51 @@ def sound_words(result: FleetPrediction, state: GearState) -> str:
         return ""
     levels = {path: level for path in PATHS if (level := sound.level_db(surface, path.key)) is not None}
     added, beside = (
-        [f"{path.key} {level:.1f} dB" for path, level in levels.items() if is_added(result.fleet, path) is wanted]
+        [
+            f"{path_word(path.key)} {level:.1f} dB"
+            for path, level in levels.items()
+            if is_added(result.fleet, path) is wanted
+        ]
         for wanted in (True, False)
     )
     parts = [", ".join(added)] if added else []
-    parts += [say("not added: {beside}", beside=", ".join(beside))] if beside else []
+    parts += [say("not added: {paths}", paths=", ".join(beside))] if beside else []
     if not parts:
         return ""
     total = sound.level_db(surface)
     start = (
         say("no level at {surface}", surface=surface)
         if total is None
-        else say("level at {surface} {total:.1f} dB", surface=surface, total=total)
+        else say("level at {surface} {level:.1f} dB", surface=surface, level=total)
     )
     return f"{start} ({'; '.join(parts)})"
 
 
 def _method(result: FleetPrediction) -> list[Block]:
     """What the paths are, and what the level is: a paragraph of point sources, a list with a housing."""
-    where, mean = _space(result.fleet)
-    housing = result.prediction.housing
+    space, housing = result.fleet.radiation.space.value, result.prediction.housing
     if housing is None:
-        text = say(
-            "The sources are points in {where}; {mean}. {of_motor} {of_mesh}; the housing is "
-            "already in it. The bearing forces' way through the housing is not computed. Levels "
-            "of both sources stand here whether the total adds them or not.",
-            where=where,
-            mean=mean,
-            of_motor=say(OF_MOTOR),
-            of_mesh=say(OF_MESH),
-        )
-        return [Paragraph(text)]
+        said = [say(POINTS_IN[space]), say(OF_MOTOR), say(OF_MESH), say(OF_POINTS)]
+        return [Paragraph(" ".join(said))]
     low, high = housing.range_hz
-    start = say(
-        "In {where} stands the housing, a closed box, computed from {low:.0f} to {high:.0f} Hz; "
-        "{mean}. Levels of every path stand here whether the total adds them or not.",
-        where=where,
-        low=low,
-        high=high,
-        mean=mean,
-    )
+    start = say(HOUSING_IN[space], low=low, high=high)
+    every = say("Levels of every path stand here whether the total adds them or not.")
     beyond = say(
         "Outside of {low:.0f} to {high:.0f} Hz point sources radiate as if there were no "
         "housing, and bearing forces give no sound.",
         low=low,
         high=high,
     )
-    return [Paragraph(start), Sentences([*_path_words(result.fleet, housing), beyond])]
+    return [Paragraph(f"{start} {every}"), Sentences([*_path_words(result.fleet, housing), beyond])]
 
 
 def _path_words(fleet: Fleet, housing: HousingFacts) -> list[str]:
     gain_db = fleet.model.structure_gain_db.value
-    gain = (
-        say(", with [model] structure_gain_db = {gain_db} dB", gain_db=pretty_signs(f"{gain_db:+g}")) if gain_db else ""
-    )
-    structure = say(
-        "Structure: the lines of the bearing forces shake the housing at its seats; its modes "
-        "(finite elements) answer and boundary elements give their sound{gain}.",
-        gain=gain,
-    )
-    motor = say(
-        "Motor: {of_motor}{of_motor_2}, as point sources beside the rigid housing, which "
-        "scatters them. Their volume flow is held, so that the housing changes their power.",
-        of_motor=say(OF_MOTOR)[:1].lower(),
-        of_motor_2=say(OF_MOTOR)[1:-1],
-    )
-    mesh = say(
-        "Mesh: {of_mesh}{of_mesh_2}, outside of the housing. That level is of a gear unit with "
-        "its housing, so the power of the source is held: the rigid housing gives it a direction "
-        "and nothing else.",
-        of_mesh=say(OF_MESH)[:1].lower(),
-        of_mesh_2=say(OF_MESH)[1:],
-    )
-    if housing.inside_m is not None:
-        mesh = say(
-            "Mesh: {of_mesh}{of_mesh_2}, inside of the housing. Its volume flow is held; the air "
-            "inside shakes the walls, and what they radiate is the level of the mesh (section "
-            "Insertion loss of the housing). Its sound power level is that of a point source "
-            "with the same mean level outside.",
-            of_mesh=say(OF_MESH)[:1].lower(),
-            of_mesh_2=say(OF_MESH)[1:],
-        )
-    return [structure, *([] if housing.motor_m is None else [motor]), mesh]
-
-
-def _space(fleet: Fleet) -> tuple[str, str]:
-    free = fleet.radiation.space.value == "free"
-    where = say("free space") if free else say("the space over rigid ground at the rail")
-    return where, say(
-        "the level is the mean in energy over the {value}", value="sphere" if free else say("half sphere")
-    )
+    gain = pretty_signs(f"{gain_db:+g}")
+    structure = say(STRUCTURE_WITH_GAIN, gain=gain) if gain_db else say(STRUCTURE)
+    motor = [] if housing.motor_m is None else [say(MOTOR)]
+    mesh = say(MESH_OUTSIDE) if housing.inside_m is None else say(MESH_INSIDE)
+    return [structure, *motor, mesh]
 
 
 def _silent_words(result: FleetPrediction) -> str:
@@ -244,7 +252,7 @@ def _figure(result: FleetPrediction, levels: dict[str, np.ndarray]) -> Figure:
     surface = result.prediction.surface
     lines = []
     if np.isfinite(levels["total"]).any():
-        lines.append(Line(speeds[order], levels["total"][order], "total", color=7, points=True))
+        lines.append(Line(speeds[order], levels["total"][order], say("total"), color=7, points=True))
     lines += [
         path_line(result.fleet, path, speeds[order], levels[path.key][order])
         for path in PATHS

@@ -9,8 +9,8 @@ import numpy as np
 from tdacoustic.drive import DriveSound, GearState, SoundSource
 from tdacoustic.reporting.document import Block, Details, FigureBlock, Paragraph, Section
 from tdacoustic.reporting.figure import Axis, Element, Figure, Line, Markers, Rule
-from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, sentence, shown_state, state_words
+from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.sections.gear_words import by_speed, conditions_words, shown_state, state_words
 from tdacoustic.reporting.sections.sound_paths import PATHS
 from tdacoustic.reporting.sections.words import slug
 from tdacoustic.results import FleetPrediction
@@ -43,14 +43,8 @@ def sound_spectra(result: FleetPrediction) -> Section | None:
     others = [pair for pair in heard if pair is not shown]
     if others:
         folded = [FigureBlock(_figure(result, *pair), "calculated") for pair in others]
-        blocks.append(
-            Details(
-                sentence(say("tones of {conditions}", conditions=conditions_words([state for state, _ in others])))[
-                    :-1
-                ],
-                folded,
-            )
-        )
+        rest = conditions_words([state for state, _ in others])
+        blocks.append(Details(say("Tones of {conditions}", conditions=rest), folded))
     return Section("sound-tones", say("Tones of each path"), blocks)
 
 
@@ -75,8 +69,12 @@ def _figure(result: FleetPrediction, state: GearState, sound: DriveSound) -> Fig
     left_out = len(tones) - len(drawn)
     return Figure(
         slug("tones", state.condition.name),
-        say("Tones of the drive at {surface}, {state}", surface=result.prediction.surface, state=state_words(state)),
-        say("{left_out} weaker tone{value} left out.", left_out=left_out, value=say("s are") if left_out > 1 else " is")
+        say(
+            "Tones of the drive at {surface}, {condition}",
+            surface=result.prediction.surface,
+            condition=state_words(state),
+        ),
+        say_count("{count} weaker tone is left out.", "{count} weaker tones are left out.", left_out)
         if left_out
         else "",
         Axis(say("Frequency"), "Hz", limits=(0.0, 1.05 * highest)),
@@ -90,4 +88,4 @@ def _stems(tones: list[tuple[SoundSource, float]], bottom: float) -> Line:
     """A thin line from the lower edge to each tone."""
     frequencies = np.repeat([source.frequency_hz for source, _ in tones], 3)
     levels = [(bottom, level, math.nan) for _, level in tones]
-    return Line(frequencies, np.array(levels).ravel(), "tones", color=7, width=1.0)
+    return Line(frequencies, np.array(levels).ravel(), say("tones"), color=7, width=1.0)

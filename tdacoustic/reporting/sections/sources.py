@@ -9,7 +9,8 @@ from collections.abc import Sequence
 from tdacoustic.attribution import SourceLine
 from tdacoustic.measured.runs import receivers
 from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Sentences, Table
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count
+from tdacoustic.reporting.sections.gear_words import begun_large
 from tdacoustic.reporting.sections.words import (
     by_frequency,
     condition_words,
@@ -19,6 +20,7 @@ from tdacoustic.reporting.sections.words import (
     probability_words,
     same_line,
     slug,
+    source_word,
 )
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
@@ -36,6 +38,12 @@ METHOD = mark(
 )
 IN_SIGHT = 8
 """Sentences of evidence that are not folded away."""
+MARKS = {
+    (True, False): mark("conflict"),
+    (False, True): mark("override"),
+    (True, True): mark("conflict, override"),
+}
+"""What stands beside a line: whether sensors and order conflict, and whether the engineer has set its source."""
 NO_LINES = mark("No noise line was found in a steady run, so there is nothing to ascribe.")
 
 
@@ -62,7 +70,10 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
         Column("frequency_hz", say("Line"), "Hz", 1, "number"),
         *([Column("channel", say("Receiver"))] if several else []),
         Column("level_db", say("Level"), "dB", 1, "number"),
-        *(Column(f"{slug(name)}_prominence_db", name.capitalize(), "dB", 0, "number") for name in components),
+        *(
+            Column(f"{slug(name)}_prominence_db", begun_large(source_word(name)), "dB", 0, "number")
+            for name in components
+        ),
         Column("radiator", say("Radiator")),
         Column("excitation", say("Excitation")),
         Column("source", say("Source"), kind="verdict"),
@@ -75,7 +86,6 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
         cells: dict[str, Cell] = {
             f"{slug(name)}_prominence_db": prominence.get(name) for name in components
         }  # minus infinity, no trace, is shown as a dash
-        marks = [word for word, true in (("conflict", source.conflict), ("override", is_override(source))) if true]
         cells |= {
             "frequency_hz": source.line.frequency_hz,
             "channel": source.line.channel,
@@ -83,14 +93,14 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
             "radiator": source.radiator or say("not asked"),
             "excitation": _excitation_words(source),
             "source": source.source,
-            "mark": ", ".join(marks),
-            "confidence": "set" if is_override(source) else probability_words(source.confidence),
+            "mark": MARKS.get((source.conflict, is_override(source)), ""),
+            "confidence": say("set") if is_override(source) else probability_words(source.confidence),
         }
         rows.append([cells[column.key] for column in columns])
     title = say("Noise lines, {condition}", condition=condition_words(analysis, condition))
     verdict = next((v.dominant for v in analysis.dominance if v.condition == condition), None)
     if verdict is not None and analysis.fleet is not None:
-        title += f": {verdict}"
+        title += f": {source_word(verdict)}"
     return Table(slug("sources", condition), title, columns, rows, origin=analysis.campaign.origin)
 
 
@@ -103,22 +113,24 @@ def _evidence(held: Sequence[SourceLine]) -> Block:
         else:
             groups.append((source, [source.line.channel]))
     several = len({source.line.channel for source in held}) > 1
-    sentences = Sentences(
-        [
-            f"{first.line.frequency_hz:.1f} Hz{f' at {joined(who)}' if several else ''}: {_words(first)}"
-            for first, who in groups
-        ]
-    )
-    n_lines = len(sentences.items)
-    return (
-        sentences
-        if n_lines <= IN_SIGHT
-        else Details(say("Evidence, {n_lines} sentences", n_lines=n_lines), [sentences])
+    sentences = Sentences([_evidence_words(first, who if several else []) for first, who in groups])
+    count = len(sentences.items)
+    if count <= IN_SIGHT:
+        return sentences
+    return Details(say_count("Evidence, {count} sentence", "Evidence, {count} sentences", count), [sentences])
+
+
+def _evidence_words(source: SourceLine, who: Sequence[str]) -> str:
+    frequency, evidence = source.line.frequency_hz, _words(source)
+    if not who:
+        return f"{frequency:.1f} Hz: {evidence}"
+    return say(
+        "{frequency:.1f} Hz at {channels}: {evidence}", frequency=frequency, channels=joined(who), evidence=evidence
     )
 
 
 def _words(source: SourceLine) -> str:
-    return pretty_signs(re.sub(r"\([+-]0\.0 Hz\)", "(0.0 Hz off)", source.evidence))
+    return pretty_signs(re.sub(r"\([+-]0\.0 Hz\)", lambda _: say("(0.0 Hz off)"), source.evidence))
 
 
 def _components(analysis: Analysis) -> list[str]:
@@ -138,9 +150,7 @@ def _overrides(analysis: Analysis) -> list[Block]:
     rows = []
     for override in analysis.campaign.overrides:
         struck = [
-            say(
-                "{frequency_hz:.1f} Hz at {channel}", frequency_hz=source.line.frequency_hz, channel=source.line.channel
-            )
+            say("{frequency:.1f} Hz at {channel}", frequency=source.line.frequency_hz, channel=source.line.channel)
             for source in analysis.sources
             if source.line.condition == override.condition
             and is_override(source)
@@ -170,10 +180,10 @@ def _excludes(analysis: Analysis) -> list[Block]:
         inside = inside[inside["channel"].isin(microphones if exclude.channel is None else [exclude.channel])]
         lines = [
             say(
-                "{frequency_hz:.1f} Hz at {channel}, {level_db:.1f} dB",
-                frequency_hz=row["frequency_hz"],
+                "{frequency:.1f} Hz at {channel}, {level:.1f} dB",
+                frequency=row["frequency_hz"],
                 channel=row["channel"],
-                level_db=row["level_db"],
+                level=row["level_db"],
             )
             for row in inside.to_dict("records")
         ]
@@ -181,7 +191,7 @@ def _excludes(analysis: Analysis) -> list[Block]:
         rows.append(
             (
                 exclude.condition,
-                exclude.channel or "all",
+                exclude.channel or say("all"),
                 say("{low:g} to {high:g}", low=low, high=high),
                 exclude.reason,
                 effect,

@@ -13,12 +13,15 @@ from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
 from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Table
 from tdacoustic.reporting.figure import Axis, Element, Figure, Heatmap, Line, Markers
-from tdacoustic.reporting.language import mark, say
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.folding import chosen
+from tdacoustic.reporting.sections.gear_words import begun_large
 from tdacoustic.reporting.sections.words import (
     condition_words,
     measured_channels,
+    pretty_signs,
     pretty_unit,
+    quantity_word,
     slug,
     speed_words,
     tested_runs,
@@ -35,7 +38,7 @@ NAMED_LINES = 8
 """Lines named on one picture; all have their names under the pointer and in the table."""
 LOWEST_HZ = 10.0
 
-_TITLES = {"sound_pressure": mark("Sound pressure"), "acceleration": mark("Acceleration")}
+LEVEL_TITLES = {"sound_pressure": mark("Sound pressure level"), "acceleration": mark("Acceleration level")}
 
 
 def spectra(analysis: Analysis, fold: bool = False) -> Section:
@@ -46,7 +49,7 @@ def spectra(analysis: Analysis, fold: bool = False) -> Section:
         if figures:
             table = _line_table(analysis, run)
             parts: list[Block] = [*figures, *([table] if table is not None else [])]
-            title = say("Run {name}: {speed}", name=run.name, speed=speed_words(run))
+            title = say("Run {run}: {speed}", run=run.name, speed=speed_words(run))
             folded = Details(say("{title}: all channels and lines", title=title), parts)
             blocks.append(folded if fold else Section(slug("run", run.name), title, parts))
     if not blocks:
@@ -99,7 +102,7 @@ def single_spectrum_figure(spectrum: Spectrum, lines: Sequence[SpectralLine] = (
     return Figure(
         slug("spectrum", spectrum.name),
         say("Spectrum of {name}", name=spectrum.name),
-        say("Line spacing {resolution_hz:.4g} Hz. ", resolution_hz=spectrum.resolution_hz) + _interval_words(spectrum),
+        " ".join([say("Line spacing {spacing:.4g} Hz.", spacing=spectrum.resolution_hz), _interval_words(spectrum)]),
         Axis(say("Frequency"), "Hz", "log"),
         level_axis(spectrum),
         elements,
@@ -110,28 +113,27 @@ def level_axis(spectrum: Spectrum) -> Axis:
     """Return the axis of a spectrum: level re its reference, else the quantity itself."""
     reference = pretty_unit(reference_label(spectrum.quantity) or "") or None
     title = quantity_title(spectrum.quantity)
-    note = say("rms in {noise_bandwidth_hz:.3g} Hz", noise_bandwidth_hz=spectrum.noise_bandwidth_hz)
+    note = say("rms in {bandwidth:.3g} Hz", bandwidth=spectrum.noise_bandwidth_hz)
     if reference is None:
         return Axis(title, pretty_unit(spectrum.si_symbol), "log", note=note)
-    return Axis(say("{title} level", title=title), "dB", reference=reference, note=note)
+    level = LEVEL_TITLES.get(spectrum.quantity)
+    return Axis(say(level) if level else say("{quantity} level", quantity=title), "dB", reference=reference, note=note)
 
 
 def _interval_words(spectrum: Spectrum) -> str:
     low, high = (10.0 * math.log10(factor) for factor in spectrum.interval())
-    return (
-        say(
-            "With {averages:.3g} independent averages the true density of noise lies within "
-            "{low:.1f} and {high:+.1f} dB of the trace (95 %).",
-            averages=spectrum.averages,
-            low=low,
-            high=high,
-        )
-    ).replace("-", "\N{MINUS SIGN}")
+    return say(
+        "With {averages:.3g} independent averages the true density of noise lies within "
+        "{low} and {high} dB of the trace (95 %).",
+        averages=spectrum.averages,
+        low=pretty_signs(f"{low:.1f}"),
+        high=pretty_signs(f"{high:+.1f}"),
+    )
 
 
 def quantity_title(quantity: str) -> str:
     """Name of a quantity as an axis has it."""
-    return say(_TITLES.get(quantity, quantity.replace("_", " ").capitalize()))
+    return begun_large(quantity_word(quantity))
 
 
 def density_levels(spectrum: Spectrum, density: np.ndarray) -> np.ndarray:
@@ -163,17 +165,18 @@ def _spectrum_figure(
     return Figure(
         slug("spectrum", run.name, quantity) + part,
         say(
-            "{quantity_title}, {condition}, run {name}{part}",
-            quantity_title=quantity_title(quantity),
+            "{quantity}, {condition}, run {run}",
+            quantity=quantity_title(quantity),
             condition=condition_words(analysis, run.run.condition or ""),
-            name=run.name,
-            part=part,
+            run=f"{run.name}{part}",
         ),
-        say(
-            "Line spacing {resolution_hz:.4g} Hz. Points are the lines found; the most prominent are named. ",
-            resolution_hz=spectrum.resolution_hz,
-        )
-        + _interval_words(spectrum),
+        " ".join(
+            [
+                say("Line spacing {spacing:.4g} Hz.", spacing=spectrum.resolution_hz),
+                say("Points are the lines found; the most prominent are named."),
+                _interval_words(spectrum),
+            ]
+        ),
         Axis(say("Frequency"), "Hz", "log"),
         level_axis(spectrum),
         elements,
@@ -197,7 +200,7 @@ def _line_markers(
         Markers(
             np.array([line.frequency_hz for line in lines]),
             np.array(y),
-            say("lines of {name}", name=name),
+            say("lines of {channel}", channel=name),
             labels=[f"{line.frequency_hz:.0f} Hz" if i in named else "" for i, line in enumerate(lines)],
             texts=[_line_words(line, turns_hz) for line in lines],
             color=slot,
@@ -225,15 +228,10 @@ def _named(lines: Sequence[Sequence[SpectralLine]]) -> list[set[int]]:
 
 
 def _line_words(line: SpectralLine, turns_hz: float | None) -> str:
-    order = say(", order {turns_hz:.2f}", turns_hz=line.frequency_hz / turns_hz) if turns_hz else ""
-    error = f"± {line.frequency_error_hz:.2g} Hz"
-    return say(
-        "{frequency_hz:.1f} Hz {error}{order}, {prominence_db:.1f} dB over the floor",
-        frequency_hz=line.frequency_hz,
-        error=error,
-        order=order,
-        prominence_db=line.prominence_db,
-    )
+    words = [f"{line.frequency_hz:.1f} Hz ± {line.frequency_error_hz:.2g} Hz"]
+    words += [say("order {order:.2f}", order=line.frequency_hz / turns_hz)] if turns_hz else []
+    words.append(say("{prominence:.1f} dB over the floor", prominence=line.prominence_db))
+    return ", ".join(words)
 
 
 def _map_figure(run: MeasuredRun, channel: Channel, result: ChannelResult) -> Figure:
@@ -245,14 +243,15 @@ def _map_figure(run: MeasuredRun, channel: Channel, result: ChannelResult) -> Fi
     z = np.where(np.isfinite(z), z, np.nan)
     top = float(np.nanmax(z)) if np.isfinite(z).any() else 0.0
     label = pretty_unit(reference_label(channel.quantity) or f"1 {channel.si_symbol}")
-    z_axis = Axis(say("Density level"), "dB", limits=(top - 60.0, top), reference=say("{label} per Hz", label=label))
+    z_axis = Axis(
+        say("Density level"), "dB", limits=(top - 60.0, top), reference=say("{reference} per Hz", reference=label)
+    )
     return Figure(
         slug("map", run.name, channel.name),
-        say("Run-up, run {name}, {name_2}: {speed}", name=run.name, name_2=channel.name, speed=speed_words(run)),
+        say("Run-up, run {run}, {channel}: {speed}", run=run.name, channel=channel.name, speed=speed_words(run)),
         say(
             "Density over time and frequency; each cell is the highest of the lines it covers. Lines that slope "
-            "follow the "
-            "speed, level ones stay at their frequency."
+            "follow the speed, level ones stay at their frequency."
         ),
         Axis(say("Time"), "s"),
         Axis(say("Frequency"), "Hz"),
@@ -281,11 +280,6 @@ def _line_table(analysis: Analysis, run: MeasuredRun) -> Details | None:
     ]
     name = slug("lines", run.name)
     return Details(
-        say(
-            "{n_rows} {value} of run {name}",
-            n_rows=len(rows),
-            value="line" if len(rows) == 1 else "lines",
-            name=run.name,
-        ),
-        [Table(name, say("Lines of run {name}", name=run.name), columns, rows)],
+        say_count("{count} line of run {run}", "{count} lines of run {run}", len(rows), run=run.name),
+        [Table(name, say("Lines of run {run}", run=run.name), columns, rows)],
     )

@@ -14,7 +14,20 @@ from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, S
 from tdacoustic.reporting.figure import Axis, Band, Element, Figure, Line
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.reporting.palette import SERIES_SLOTS
+from tdacoustic.reporting.sections.speed_sentences import (
+    Held,
+    faults_said,
+    percent_words,
+    profiles_of,
+    reasons_of,
+    runs_words,
+    scale_of,
+    shaft_of,
+    tellers_said,
+    unknown_said,
+)
 from tdacoustic.reporting.sections.words import joined, pretty_signs, pretty_unit, slug, tested_runs
+from tdacoustic.reporting.shown import range_text
 from tdacoustic.results import Analysis
 from tdacoustic.speed import SpeedProfile, WheelSlip
 
@@ -26,10 +39,7 @@ SIGMAS = 2.0
 VISIBLE = 0.004
 """Half width of a band, over the range of what is drawn, from which it can be seen."""
 MOST_BANDS = 4
-MOST_SENTENCES = MOST_FAULTS = 6
-_KINDS = {"tacho": mark("tacho"), "channel": mark("speed channel"), "lines": mark("lines of vibration")}
-
-Held = list[tuple[MeasuredRun, SpeedProfile]]
+_EVENTS = {"slip": mark("slip"), "slide": mark("slide")}
 
 
 def speed(analysis: Analysis) -> Section | None:
@@ -37,13 +47,13 @@ def speed(analysis: Analysis) -> Section | None:
     runs = tested_runs(analysis)
     by_teller: dict[tuple[str, str, str], Held] = {}
     for run in runs:
-        for profile in _profiles(run):
+        for profile in profiles_of(run):
             teller = "lines" if profile.source == "lines" else profile.channel
             by_teller.setdefault((teller, profile.shaft or "", profile.si_symbol), []).append((run, profile))
-    sought = [run for run in runs if _reasons(run)]
+    sought = [run for run in runs if reasons_of(run)]
     if not by_teller and not sought:
         return None
-    blocks: list[Block] = [Sentences([*_said(by_teller), *_not_found(sought), *_faults(runs)])]
+    blocks: list[Block] = [Sentences([*tellers_said(by_teller), *unknown_said(sought), *faults_said(runs)])]
     for (teller, shaft, si_symbol), held in by_teller.items():
         blocks += [FigureBlock(figure, analysis.campaign.origin) for figure in _figures(teller, shaft, si_symbol, held)]
     if analysis.slips:
@@ -52,156 +62,13 @@ def speed(analysis: Analysis) -> Section | None:
     return Section("speed", say("Speed over time"), blocks)
 
 
-def _profiles(run: MeasuredRun) -> tuple[SpeedProfile, ...]:
-    return () if run.measurement is None else run.measurement.speed.profiles
-
-
-def _reasons(run: MeasuredRun) -> list[str]:
-    """Why speeds that were looked for could not be had."""
-    if run.measurement is None:
-        return []
-    speeds = run.measurement.speed
-    found = [reason for _, reason in speeds.problems]
-    return found + ([speeds.lines.reason] if speeds.lines is not None and speeds.lines.reason is not None else [])
-
-
-def _scale(si_symbol: str) -> tuple[float, str]:
-    return (60.0, "rpm") if si_symbol == "1/s" else (3.6, "km/h")
-
-
-def _of_what(shaft: str, si_symbol: str) -> str:
-    return (
-        say("the train") if si_symbol == "m/s" else say("the {shaft} shaft", shaft=shaft) if shaft else say("a shaft")
-    )
-
-
-# ---------------------------------------------------------------- sentences
-
-
-def _said(by_teller: Mapping[tuple[str, str, str], Held]) -> Iterator[str]:
-    """One sentence for each channel, and one for each run whose speed comes from lines."""
-    for (teller, shaft, si_symbol), held in by_teller.items():
-        if teller == "lines":
-            yield from (_of_lines(run, profile) for run, profile in held[:MOST_SENTENCES])
-            if len(held) > MOST_SENTENCES:
-                yield say(
-                    "So it is in {most_sentences} more runs; the table has them all.",
-                    most_sentences=len(held) - MOST_SENTENCES,
-                )
-            continue
-        factor, unit = _scale(si_symbol)
-        low = min(float(profile.speed.min()) for _, profile in held) * factor
-        high = max(float(profile.speed.max()) for _, profile in held) * factor
-        kind = say(_KINDS[held[0][1].source]).capitalize()
-        words = say(
-            "{kind} {teller} tells the speed of {of_what} in {counted}, ",
-            kind=kind,
-            teller=teller,
-            of_what=_of_what(shaft, si_symbol),
-            counted=_counted(held),
-        )
-        words += (
-            say("which stands")
-            if low == high == 0.0
-            else pretty_signs(say("{low:.4g} to {high:.4g} {unit}", low=low, high=high, unit=unit))
-        )
-        errors = [_relative_error(profile) for _, profile in held if profile.error is not None]
-        errors = [error for error in errors if np.isfinite(error)]
-        if errors and not low == high == 0.0:
-            words += say("; a value's standard error is {percent}", percent=_percent(max(errors)))
-            words += (
-                say(", by the scatter of its edges") if held[0][1].source == "tacho" else say(", by its own scatter")
-            )
-        yield f"{words}."
-
-
-def _counted(held: Held) -> str:
-    return say("{n_held} runs", n_held=len(held)) if len(held) > 1 else say("run {name}", name=held[0][0].name)
-
-
-def _relative_error(profile: SpeedProfile) -> float:
-    """Median of error over speed where the shaft turns."""
-    assert profile.error is not None
-    turning = np.abs(profile.speed) > 0.05 * np.max(np.abs(profile.speed), initial=0.0)
-    return float(np.median(profile.error[turning] / np.abs(profile.speed[turning]))) if turning.any() else float("nan")
-
-
-def _percent(part: float) -> str:
-    return say("less than 0.01 %") if part < 1e-4 else f"{100.0 * part:.2g} %"
-
-
-def _of_lines(run: MeasuredRun, profile: SpeedProfile) -> str:
-    factor, unit = _scale(profile.si_symbol)
-    told = any(other.source != "lines" for other in _profiles(run))
-    beside = say("beside its channels") if told else say("which no channel tells")
-    words = say(
-        "The motor's speed in run {name}, {beside}, is read from the {channel}: ",
-        name=run.name,
-        beside=beside,
-        channel=profile.channel,
-    )
-    words += say(
-        "{speed:.4g} to {speed_2:.4g} {unit}",
-        speed=factor * float(profile.speed.min()),
-        speed_2=factor * float(profile.speed.max()),
-        unit=unit,
-    )
-    if profile.confidence is not None:
-        words += say(", median confidence {median:.2f}", median=float(np.median(profile.confidence)))
-    if profile.error is not None:
-        words += say(", standard error {percent}", percent=_percent(_relative_error(profile)))
-    share = 1.0 if run.span_s is None else profile.known_share(*run.span_s)
-    words += say(", known in {share:.0f} % of the run", share=100.0 * share)
-    others = [other for other in _profiles(run) if other.source != "lines" and other.shaft == profile.shaft]
-    off = _off(profile, others[0]) if others else None
-    if off is not None:
-        words += say("; it lies {off:.2g} % (rms) beside {channel}", off=100.0 * off, channel=others[0].channel)
-    return f"{words}."
-
-
-def _off(profile: SpeedProfile, other: SpeedProfile) -> float | None:
-    """Relative rms distance between two speeds of one shaft."""
-    beside = np.abs(other.speed_at(profile.times_s))
-    both = np.isfinite(beside) & (beside > 0.0)
-    if not both.any():
-        return None
-    return float(np.sqrt(np.mean((np.abs(profile.speed[both]) / beside[both] - 1.0) ** 2)))
-
-
-def _not_found(runs: Sequence[MeasuredRun]) -> Iterator[str]:
-    for run in runs:
-        known = say("Run") if _profiles(run) else say("The speed is not known in run")
-        yield f"{known} {run.name}: {'; '.join(_reasons(run))}."
-
-
-def _faults(runs: Sequence[MeasuredRun]) -> Iterator[str]:
-    found = [
-        pretty_unit(
-            say(
-                "Run {name}, {channel}: {faults}.",
-                name=run.name,
-                channel=profile.channel,
-                faults="; ".join(profile.faults),
-            )
-        )
-        for run in runs
-        for profile in _profiles(run)
-        if profile.faults
-    ]
-    yield from found[:MOST_FAULTS]
-    if len(found) > MOST_FAULTS:
-        yield say(
-            "{most_faults} more speeds have faults, which stand under quality.", most_faults=len(found) - MOST_FAULTS
-        )
-
-
 # ---------------------------------------------------------------- figures
 
 
 def _figures(teller: str, shaft: str, si_symbol: str, held: Held) -> Iterator[Figure]:
     """Speed over time of all runs; of lines their confidence too."""
-    factor, unit = _scale(si_symbol)
-    label = say("Train speed") if si_symbol == "m/s" else say("Speed of {of_what}", of_what=_of_what(shaft, si_symbol))
+    factor, unit = scale_of(si_symbol)
+    label = say("Train speed") if si_symbol == "m/s" else say("Speed of {shaft}", shaft=shaft_of(shaft, si_symbol))
     elements: list[Element] = []
     drawn = factor * np.concatenate([profile.speed for _, profile in held])
     visible = VISIBLE * float(np.ptp(drawn)) if len(held) <= MOST_BANDS else float("inf")
@@ -209,16 +76,17 @@ def _figures(teller: str, shaft: str, si_symbol: str, held: Held) -> Iterator[Fi
         elements += _drawn(run, profile, factor, number % SERIES_SLOTS, visible)
     lines = teller == "lines"
     banded = any(isinstance(element, Band) for element in elements)
-    caption = say("Read from the lines of the drive's orders.") if lines else say("As the channel tells it.")
-    caption += say(" The band is {sigmas:g} standard errors to each side.", sigmas=SIGMAS) if banded else ""
+    told = [say("Read from the lines of the drive's orders.") if lines else say("As the channel tells it.")]
+    if banded:
+        told.append(say("The band is {sigmas:g} standard errors to each side.", sigmas=SIGMAS))
     if any(profile.unknown for _, profile in held):
-        caption += say(" Where a trace breaks off, the speed is not known.")
-    title = say("Speed over time, from lines") if lines else say("Speed over time, channel {teller}", teller=teller)
+        told.append(say("Where a trace breaks off, the speed is not known."))
+    title = say("Speed over time, from lines") if lines else say("Speed over time, channel {channel}", channel=teller)
     time = Axis(say("Time from the start of the run"), "s")
-    yield Figure(slug("speed", teller), title, caption, time, Axis(label, unit), elements, height=320)
+    yield Figure(slug("speed", teller), title, " ".join(told), time, Axis(label, unit), elements, height=320)
     if lines:
         traces = [
-            Line(*_broken(profile, profile.confidence), say("run {name}", name=run.name), color=number % SERIES_SLOTS)
+            Line(*_broken(profile, profile.confidence), say("run {run}", run=run.name), color=number % SERIES_SLOTS)
             for number, (run, profile) in enumerate(held)
             if profile.confidence is not None
         ]
@@ -237,15 +105,15 @@ def _drawn(run: MeasuredRun, profile: SpeedProfile, factor: float, slot: int, vi
     if profile.error is not None:
         _, half = _broken(profile, SIGMAS * factor * profile.error)
         if np.nanmax(half) > visible:
-            found.append(Band(times, values - half, values + half, say("run {name}, error", name=run.name), color=slot))
-    found.append(Line(times, values, say("run {name}", name=run.name), color=slot))
-    others = [other for other in _profiles(run) if other.source != "lines" and other.shaft == profile.shaft]
+            found.append(Band(times, values - half, values + half, say("run {run}, error", run=run.name), color=slot))
+    found.append(Line(times, values, say("run {run}", run=run.name), color=slot))
+    others = [other for other in profiles_of(run) if other.source != "lines" and other.shaft == profile.shaft]
     if profile.source == "lines" and others:
         beside = _broken(others[0], factor * np.abs(others[0].speed))
         found.append(
             Line(
                 *beside,
-                say("run {name}, {channel}", name=run.name, channel=others[0].channel),
+                say("run {run}, {channel}", run=run.name, channel=others[0].channel),
                 style="dashed",
                 color=slot,
             )
@@ -279,10 +147,10 @@ def _slip_blocks(analysis: Analysis) -> list[Block]:
                 say("run {run}", run=run)
                 if one
                 else say(
-                    "run {run}, {shaft_channel} against {train_channel}",
+                    "run {run}, {shaft} against {train}",
                     run=run,
-                    shaft_channel=item.shaft_channel,
-                    train_channel=item.train_channel,
+                    shaft=item.shaft_channel,
+                    train=item.train_channel,
                 )
             )
             traces.append(Line(item.slip.times_s, 100.0 * item.slip.slip, name, color=number % SERIES_SLOTS))
@@ -311,44 +179,47 @@ def _slip_words(held: Sequence[tuple[str, RunSlip]]) -> Iterator[str]:
     for run, item, slip in told:
         if slip.events:
             worst = max(slip.events, key=lambda event: abs(event.peak))
-            kinds = joined([f"{sum(e.kind == kind for e in slip.events)} × {kind}" for kind in _kinds(slip)])
+            kinds = joined(
+                [f"{sum(e.kind == kind for e in slip.events)} × {say(_EVENTS[kind])}" for kind in _kinds(slip)]
+            )
             peak = pretty_signs(f"{100.0 * worst.peak:+.2g} %")
             yield (
                 say(
-                    "Run {run}: the wheels lose adhesion ({kinds}, by {shaft_channel} against "
-                    "{train_channel}), at worst {peak} beside the usual slip, from {first_s:.1f} s "
-                    "to {last_s:.1f} s.",
+                    "Run {run}: the wheels lose adhesion ({events}, by {shaft} against {train}), at worst {peak} "
+                    "beside the usual slip, from {start:.1f} s to {end:.1f} s.",
                     run=run,
-                    kinds=kinds,
-                    shaft_channel=item.shaft_channel,
-                    train_channel=item.train_channel,
+                    events=kinds,
+                    shaft=item.shaft_channel,
+                    train=item.train_channel,
                     peak=peak,
-                    first_s=worst.first_s,
-                    last_s=worst.last_s,
+                    start=worst.first_s,
+                    end=worst.last_s,
                 )
             )
     if told:
-        usual = [100.0 * slip.usual for _, _, slip in told]
-        span = f"{min(usual):+.2f} %" + (say(" to {usual:+.2f} %", usual=max(usual)) if len(usual) > 1 else "")
-        errors = [float(np.median(slip.error)) for _, _, slip in told if slip.error is not None]
-        known = say(", one value ± {percent} (1 σ)", percent=_percent(max(errors))) if errors else ""
-        calm = "" if any(slip.events for _, _, slip in told) else say("; adhesion is never lost")
-        yield (
-            say(
-                "The usual slip of {runs_in} is {span}{known}{calm}. Creep, wear of the wheel and a "
-                "wrong scale of either speed look alike in it.",
-                runs_in=_runs_in_words([run for run, _, _ in told]),
-                span=pretty_signs(span),
-                known=known,
-                calm=calm,
-            )
-        )
+        yield _usual_slip_words(told)
     yield from (say("Run {run}: {reason}.", run=run, reason=item.reason) for run, item in held if item.slip is None)
 
 
-def _runs_in_words(runs: Sequence[str]) -> str:
-    names = list(dict.fromkeys(runs))
-    return say("run {names}", names=names[0]) if len(names) == 1 else say("{n_names} runs", n_names=len(names))
+def _usual_slip_words(told: Sequence[tuple[str, RunSlip, WheelSlip]]) -> str:
+    usual = [100.0 * slip.usual for _, _, slip in told]
+    low, high = (pretty_signs(f"{end:+.2f} %") for end in (min(usual), max(usual)))
+    runs, span = runs_words([run for run, _, _ in told]), range_text(low, high) if len(usual) > 1 else low
+    errors = [float(np.median(slip.error)) for _, _, slip in told if slip.error is not None]
+    clauses = [
+        say(
+            "The usual slip of {runs} is {slip}, one value ± {error} (1 σ)",
+            runs=runs,
+            slip=span,
+            error=percent_words(max(errors)),
+        )
+        if errors
+        else say("The usual slip of {runs} is {slip}", runs=runs, slip=span)
+    ]
+    if not any(slip.events for _, _, slip in told):
+        clauses.append(say("adhesion is never lost"))
+    alike = say("Creep, wear of the wheel and a wrong scale of either speed look alike in it.")
+    return f"{'; '.join(clauses)}. {alike}"
 
 
 def _kinds(slip: WheelSlip) -> list[str]:

@@ -207,8 +207,7 @@ def _displacements(result: FleetPrediction, sweep: SpeedSweep) -> Figure:
         say(
             "Peak to peak, of a motion that does not repeat that of its record. Broken vertical lines are natural "
             "frequencies of the linear system on seats that do not move; the nth harmonic of the mesh meets one "
-            "already "
-            "at an nth of it. Diamonds are the conditions, each computed by itself from teeth in contact."
+            "already at an nth of it. Diamonds are the conditions, each computed by itself from teeth in contact."
         ),
         Axis(say("Mesh frequency"), "Hz", limits=(low, high)),
         Axis(say("DTE"), "µm", note=say("peak to peak")),
@@ -241,8 +240,8 @@ def _multipliers(sweep: SpeedSweep) -> Figure:
         say("Largest Floquet multiplier over the speed sweep"),
         say(
             "Of the motion that repeats with each mesh period, where one was found, else of the one that repeats after "
-            "several; above 1 it is unstable, and the motion of the figure above is another. In a gap neither "
-            "was found."
+            "several; above 1 it is unstable, and the motion of the figure above is another. In a gap neither was "
+            "found."
         ),
         Axis(say("Mesh frequency"), "Hz", limits=(low, high)),
         Axis(say("Largest multiplier")),

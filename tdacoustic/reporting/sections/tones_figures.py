@@ -10,7 +10,14 @@ from tdacoustic.measured.tonality import RunTone, Tonality
 from tdacoustic.reporting.figure import Axis, Bars, Element, Figure, Line, Markers
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.spectra import density_levels, level_axis
-from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, condition_words, slug, tested_runs
+from tdacoustic.reporting.sections.words import (
+    OWNER_SLOT_OTHER,
+    OWNER_SLOTS,
+    condition_words,
+    slug,
+    source_word,
+    tested_runs,
+)
 from tdacoustic.results import Analysis
 
 __all__ = ["audibility_figure", "criterion_figure", "run_up_figures"]
@@ -42,9 +49,8 @@ def audibility_figure(analysis: Analysis, found: Tonality, microphones: Sequence
         "audibility",
         say("Mean audibility by run, {method}", method=method),
         say(
-            "Above 0 dB a tone is audible over the noise that masks it; \N{MINUS SIGN}10 dB stands for no "
-            "audible tone. "
-            "The bars' errors are the 90 % interval."
+            "Above 0 dB a tone is audible over the noise that masks it; \N{MINUS SIGN}10 dB stands for no audible "
+            "tone. The bars' errors are the 90 % interval."
         ),
         Axis(say("Run")),
         Axis(say("Mean audibility"), "dB"),
@@ -87,12 +93,11 @@ def criterion_figure(analysis: Analysis, found: Tonality, run: str, channel: str
             channel=channel,
         ),
         say(
-            "Line spacing {resolution_hz:.3g} Hz. Points are the tones' levels; their colour is "
-            "their owner. Both curves start from the noise in the critical band under the lines: "
-            "plus the masking index of ISO/TS 20065 a tone is audible, plus the criterion of the "
-            "tone-to-noise ratio (ECMA-418-1) it is prominent. The ratings stand under each point; "
-            "they take the noise as each standard does.",
-            resolution_hz=spectrum.resolution_hz,
+            "Line spacing {spacing:.3g} Hz. Points are the tones' levels; their colour is their owner. Both curves "
+            "start from the noise in the critical band under the lines: plus the masking index of ISO/TS 20065 a tone "
+            "is audible, plus the criterion of the tone-to-noise ratio (ECMA-418-1) it is prominent. The ratings "
+            "stand under each point; they take the noise as each standard does.",
+            spacing=spectrum.resolution_hz,
         ),
         Axis(say("Frequency"), "Hz", "log", limits=(low, high)),
         Axis(
@@ -118,7 +123,7 @@ def _tone_markers(found: Tonality, held: Sequence[RunTone]) -> list[Markers]:
                 Markers(
                     np.array([tone.frequency_hz for tone in own]),
                     np.array([tone.level_db for tone in own]),
-                    say("owner {owner}", owner="unknown" if owner == "unassigned" else owner),
+                    _owner_words(owner),
                     labels,
                     [_words(found, tone) for tone in own],
                     color=OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
@@ -127,8 +132,8 @@ def _tone_markers(found: Tonality, held: Sequence[RunTone]) -> list[Markers]:
     return markers
 
 
-def _order(tone: RunTone) -> str:
-    return "" if tone.order is None else say(" ({order:.2f} per motor turn)", order=tone.order)
+def _owner_words(owner: str) -> str:
+    return say("owner unknown") if owner == "unassigned" else say("owner {owner}", owner=source_word(owner))
 
 
 def _short(tone: RunTone) -> str:
@@ -143,10 +148,10 @@ def _words(found: Tonality, tone: RunTone) -> str:
         if (other.run, other.channel) == (tone.run, tone.channel) and near and other.value_db is not None:
             words.append(
                 say(
-                    "{method}: {value_db:.1f} dB (from {criterion_db:.1f} dB)",
+                    "{method}: {level:.1f} dB (from {criterion:.1f} dB)",
                     method=other.method,
-                    value_db=other.value_db,
-                    criterion_db=other.criterion_db,
+                    level=other.value_db,
+                    criterion=other.criterion_db,
                 )
             )
     return "\n".join([*words, *tone.notes])
@@ -195,18 +200,8 @@ def _tones_over_speed(run: str, shown: Sequence[RunTone], method: str) -> Figure
                 Markers(
                     np.array(middles),
                     np.array([tone.frequency_hz for tone in own]),
-                    say("owner {owner}", owner="unknown" if owner == "unassigned" else owner),
-                    texts=[
-                        say(
-                            "{frequency_hz:.1f} Hz{order}, {short}, {channel}\naudibility {value_db:.1f} dB",
-                            frequency_hz=t.frequency_hz,
-                            order=_order(t),
-                            short=_short(t),
-                            channel=t.channel,
-                            value_db=t.value_db or 0.0,
-                        )
-                        for t in own
-                    ],
+                    _owner_words(owner),
+                    texts=[_words_over_speed(tone) for tone in own],
                     color=OWNER_SLOTS.get(owner, OWNER_SLOT_OTHER),
                 )
             )
@@ -214,12 +209,20 @@ def _tones_over_speed(run: str, shown: Sequence[RunTone], method: str) -> Figure
         slug("tones-over-speed", run),
         say("Audible tones over the speed, run {run}, {method}", run=run, method=method),
         say(
-            "At the middle of the speed class that each was heard in. Tones at one height stand still; tones "
-            "that climb "
-            "with the speed follow an order."
+            "At the middle of the speed class that each was heard in. Tones at one height stand still; tones that "
+            "climb with the speed follow an order."
         ),
         Axis(say("Speed"), unit),
         Axis(say("Frequency"), "Hz", "log"),
         markers,
         height=360,
     )
+
+
+def _words_over_speed(tone: RunTone) -> str:
+    """What stands under the pointer: whose tone it is, how audible."""
+    frequency = f"{tone.frequency_hz:.1f} Hz"
+    if tone.order is not None:
+        frequency = say("{frequency} ({order:.2f} per motor turn)", frequency=frequency, order=tone.order)
+    audibility = say("audibility {level:.1f} dB", level=tone.value_db or 0.0)
+    return f"{frequency}, {_short(tone)}, {tone.channel}\n{audibility}"

@@ -16,6 +16,7 @@ from tdacoustic.results import Analysis
 __all__ = [
     "OWNER_SLOTS",
     "OWNER_SLOT_OTHER",
+    "SHAFT_WORDS",
     "UNKNOWN_SPEED",
     "by_frequency",
     "condition_words",
@@ -45,7 +46,13 @@ SOURCE_WORDS = {
     "unassigned": mark("unassigned"),
     "undecided": mark("undecided"),
     "residual": mark("residual"),
+    "wheelset": mark("wheelset"),
+    "bogie": mark("bogie"),
+    "body": mark("body"),
+    "air": mark("air"),
+    "shaft": mark("shaft"),
 }
+"""Sources, and the components that can be one."""
 
 SHAFT_WORDS = {"motor": mark("motor"), "wheelset": mark("wheelset")}
 
@@ -111,11 +118,10 @@ def speed_words(run: MeasuredRun) -> str:
             words.append(f"{profile.channel} {factor * profile.mean:.4g} {unit}")
         elif not run.measurement.steady:
             factor, unit = (60.0, "rpm") if profile.si_symbol == "1/s" else (3.6, "km/h")
-            ends = {"lowest": factor * profile.speed.min(), "highest": factor * profile.speed.max(), "unit": unit}
+            lowest, highest = factor * profile.speed.min(), factor * profile.speed.max()
+            ends = say("{lowest:.4g} to {highest:.4g} {unit}", lowest=lowest, highest=highest, unit=unit)
             words.append(
-                say("{shaft} {lowest:.4g} to {highest:.4g} {unit}", shaft=say(SHAFT_WORDS[profile.shaft]), **ends)
-                if profile.shaft
-                else say("{lowest:.4g} to {highest:.4g} {unit}", **ends)
+                say("{shaft} {speeds}", shaft=say(SHAFT_WORDS[profile.shaft]), speeds=ends) if profile.shaft else ends
             )
         if profile.source == "lines":
             words.append(say("read from lines"))
@@ -124,7 +130,7 @@ def speed_words(run: MeasuredRun) -> str:
 
 def source_word(name: str) -> str:
     """Name of a source as it is said; one that a fleet names itself stays as it is."""
-    return say(SOURCE_WORDS.get(name, name))
+    return say(SOURCE_WORDS[name]) if name in SOURCE_WORDS else name
 
 
 def quantity_word(quantity: str) -> str:
