@@ -43,25 +43,18 @@ from tdacoustic.reporting.document import (
     walk,
 )
 from tdacoustic.reporting.figure import Heatmap
-from tdacoustic.reporting.language import say, say_count, spoken
+from tdacoustic.reporting.language import say, spoken
 from tdacoustic.reporting.layout import figure_width
 from tdacoustic.reporting.matplotlib_renderer import render_png
+from tdacoustic.reporting.page_limits import PAGE_LIMITS, PageLimits, left_out_words, rows_that_fit
 from tdacoustic.reporting.palette import DARK, LIGHT, css_variables
 from tdacoustic.reporting.plotly_renderer import is_reduced, render_plotly
 from tdacoustic.reporting.shown import NOTICE_WORDS, ORIGIN_SENTENCES, ORIGIN_WORDS, cell_text
 from tdacoustic.reporting.sound_view import sound_view
 from tdacoustic.tables.writing import csv_cell
 
-__all__ = ["MAX_FIGURE_BYTES", "MAX_INTERACTIVE", "csv_cell", "render_html", "safe_json"]
+__all__ = ["csv_cell", "render_html", "safe_json"]
 
-MAX_INTERACTIVE: Final = 100
-"""Figures of a page that can be zoomed; later ones are still pictures."""
-MAX_FIGURE_BYTES: Final = 12_000_000
-"""Data of all figures of a page that can be zoomed."""
-MAX_PICTURE_BYTES: Final = 12_000_000
-"""Still pictures of a page, as text; later figures are left out, and the page says so in their places."""
-MAX_SOUND_BYTES: Final = 4_000_000
-"""Of all sounds of a page, as text."""
 STATIC_DPI: Final = 150
 
 _SOURCES: Final = frozenset({"motor", "gearbox", "undecided", "mixed"})
@@ -134,7 +127,8 @@ def _raw(text: str, shown: str) -> str | None:
     return None if raw == shown.strip() else raw
 
 
-def _table(table: Table) -> dict[str, Any]:
+def _table(table: Table, most_bytes: int) -> tuple[dict[str, Any], int]:
+    """A table with the rows that fit, and their bytes."""
     columns = [
         {
             "key": column.key,
@@ -145,19 +139,22 @@ def _table(table: Table) -> dict[str, Any]:
         }
         for column in table.columns
     ]
-    rows = [
+    made = (
         [_cell(column, cell, index == 0) for index, (column, cell) in enumerate(zip(table.columns, row, strict=True))]
         for row in table.rows
-    ]
-    return {
+    )
+    rows, taken = rows_that_fit(made, most_bytes)
+    view = {
         "type": "table",
         "name": table.name,
         "caption": table.caption,
         "columns": columns,
         "rows": rows,
+        "all_rows": len(table.rows),
         "file": table.csv_name,
         "origin": table.origin,
     }
+    return view, taken
 
 
 def _png_size(png: bytes) -> tuple[int, int]:
@@ -169,13 +166,13 @@ def _png_size(png: bytes) -> tuple[int, int]:
 class _Views:
     """Blocks as the template reads them; counts figures and tables, and what the figures weigh."""
 
-    max_interactive: int
-    max_figure_bytes: int
-    max_picture_bytes: int
+    limits: PageLimits
     figures: int = 0
     picture_bytes: int = 0
     left_out: int = 0
     tables: int = 0
+    table_bytes: int = 0
+    cut_tables: int = 0
     sounds: int = 0
     sound_bytes: int = 0
     alternatives: int = 0
@@ -189,7 +186,7 @@ class _Views:
     def figure(self, block: FigureBlock) -> dict[str, Any]:
         figure = block.figure
         self.figures += 1
-        if self.picture_bytes > self.max_picture_bytes:
+        if self.picture_bytes > self.limits.picture_bytes:
             self.left_out += 1
             return {"type": "left_out", "number": self.figures, "name": figure.name, "title": figure.title.rstrip(".")}
         heat = any(isinstance(element, Heatmap) for element in figure.elements)
@@ -221,16 +218,24 @@ class _Views:
 
     def payload(self, block: FigureBlock) -> Markup | None:
         """The figure's data for the page's script, or None once the page is full."""
-        if self.full or self.interactive >= self.max_interactive:
+        if self.full or self.interactive >= self.limits.interactive:
             self.full = True
             return None
         text = safe_json(render_plotly(block.figure, scheme="css"))
-        if self.figure_bytes + len(text) > self.max_figure_bytes:
+        if self.figure_bytes + len(text) > self.limits.figure_bytes:
             self.full = True
             return None
         self.interactive += 1
         self.figure_bytes += len(text)
         return Markup(text)
+
+    def table(self, block: Table) -> dict[str, Any]:
+        self.tables += 1
+        left = self.limits.table_bytes - self.table_bytes
+        view, taken = _table(block, min(self.limits.one_table_bytes, left))
+        self.table_bytes += taken
+        self.cut_tables += len(view["rows"]) < view["all_rows"]
+        return view | {"number": self.tables, "behind": self.behind}
 
     def block(self, block: Block, level: int, number: str) -> dict[str, Any]:
         if isinstance(block, Paragraph):
@@ -245,11 +250,10 @@ class _Views:
             return self.figure(block)
         if isinstance(block, Sound):
             self.sounds += 1
-            self.sound_bytes, view = sound_view(block, self.sounds, self.sound_bytes, MAX_SOUND_BYTES)
+            self.sound_bytes, view = sound_view(block, self.sounds, self.sound_bytes, self.limits.sound_bytes)
             return view | {"behind": self.behind}
         if isinstance(block, Table):
-            self.tables += 1
-            return _table(block) | {"number": self.tables, "behind": self.behind}
+            return self.table(block)
         if isinstance(block, Details):
             return {"type": "details", "summary": block.summary, "blocks": self.blocks(block.blocks, level, number)}
         if isinstance(block, Alternatives):
@@ -296,23 +300,15 @@ def _sections(document: Document, views: _Views) -> list[dict[str, Any]]:
     return sections
 
 
-def render_html(
-    document: Document,
-    max_interactive: int = MAX_INTERACTIVE,
-    max_figure_bytes: int = MAX_FIGURE_BYTES,
-    max_picture_bytes: int = MAX_PICTURE_BYTES,
-) -> str:
+def render_html(document: Document, limits: PageLimits = PAGE_LIMITS) -> str:
     """Write a document as one HTML page that needs nothing else.
 
     Parameters
     ----------
     document : Document
         What it says.
-    max_interactive, max_figure_bytes : int
-        How many figures, and how many bytes of their data, can be zoomed; the figures after
-        that are still pictures, and the page says so.
-    max_picture_bytes : int
-        How many bytes still pictures may have; the figures after that are left out, and the page says so.
+    limits : PageLimits
+        How much of it the page holds at most; what it leaves out, it says.
 
     Returns
     -------
@@ -326,26 +322,11 @@ def render_html(
     >>> "a &lt; b" in page
     True
     """
-    views = _Views(max_interactive, max_figure_bytes, max_picture_bytes, lineage=document.lineage)
+    views = _Views(limits, lineage=document.lineage)
     sections = _sections(document, views)
-    if views.full:
-        still = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
-        text = say(
-            "Of the {all} figures of this page the first {count} can be zoomed; the others are still pictures, "
-            "which keeps the page small.",
-            all=still,
-            count=views.interactive,
-        )
-        if views.left_out:
-            left_out = say_count(
-                "The last one is left out; what it shows is in result.h5 and the tables.",
-                "The last {count} are left out; what they show is in result.h5 and the tables.",
-                views.left_out,
-            )
-            text = f"{text} {left_out}"
-        document_notices = (*document.notices, Notice("info", text))
-    else:
-        document_notices = tuple(document.notices)
+    figures = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
+    said = left_out_words(figures, views.interactive if views.full else figures, views.left_out, views.cut_tables)
+    document_notices = (*document.notices, *([Notice("info", said)] if said else []))
     packed, plotly_hash = _plotly_script() if views.interactive else ("", "")
     script = _template("page.js")
     hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]

@@ -29,6 +29,7 @@ from tdacoustic.reporting import (
 )
 from tdacoustic.reporting.document import ORIGINS
 from tdacoustic.reporting.html import csv_cell, render_html, safe_json
+from tdacoustic.reporting.page_limits import PageLimits
 
 COLUMNS = (
     Column("channel", "Channel"),
@@ -165,11 +166,11 @@ def test_structure_is_semantic_and_anchors_are_unique(page: str) -> None:
 
 
 def test_later_figures_are_still_pictures_and_the_page_says_so() -> None:
-    page = render_html(document(), max_interactive=2)
+    page = render_html(document(), PageLimits(interactive=2))
     assert page.count('<script type="application/json">{"data"') == 2
     assert "Of the 5 figures of this page the first 2 can be zoomed" in page
     assert page.count("A still picture") == 3
-    small = render_html(document(), max_figure_bytes=10)
+    small = render_html(document(), PageLimits(figure_bytes=10))
     assert 'id="plotly"' not in small and len(small) < 600_000
 
 
@@ -214,10 +215,32 @@ def test_a_page_that_holds_no_more_pictures_says_which_it_leaves_out():
     blocks = [FigureBlock(spectrum(f"figure-{n}", f"word {n}", 301), "measured") for n in range(5)]
     page = render_html(
         Document("Report", "", "measured", sections=[Section("one", "One", blocks)]),
-        max_interactive=1,
-        max_picture_bytes=40_000,
+        PageLimits(interactive=1, picture_bytes=40_000),
     )
     kept = page.count("data:image/png;base64,")
     assert 1 <= kept < 5
     assert page.count("Left out: the page holds no more pictures") == 5 - kept
     assert f"The last {5 - kept} are left out" in page and "Figure 5. Spectrum word 4. Left out" in page
+
+
+def test_a_page_that_holds_no_more_rows_says_which_tables_it_cuts():
+    columns = [Column("name", "Name"), Column("level_db", "Level", "dB", 1, "number")]
+    rows = [(f"name {n}", 60.0 + n) for n in range(500)]
+    tables = [Table(f"t{n}", "Levels", columns, rows if n < 4 else rows[:5]) for n in range(5)]
+    page = render_html(
+        Document("Report", "", "measured", sections=[Section("one", "One", tables)]),
+        PageLimits(one_table_bytes=6_000, table_bytes=14_000),
+    )
+    kept = [part.count("<tr>") - 1 for part in page.split("<table>")[1:]]  # less the head
+    # a row has a name of 6 to 8 signs, a level of 4, perhaps its raw value, and two cells' marks
+    assert 6_000 / (8 + 5 + 5 + 24) - 1 < kept[0] == kept[1] < 6_000 / (6 + 4 + 24) + 1
+    assert kept[0] > kept[2] >= 12 and kept[3] == 12 and kept[4] == 5
+    for count in kept[:4]:
+        assert f"The first {count} of 500 rows: the page holds no more." in page
+    assert "Of 4 long tables the first rows alone are shown" in page
+    assert "long tables" not in render_html(Document("Report", "", "measured", sections=[Section("o", "O", tables)]))
+
+
+def test_a_page_within_its_limits_can_be_sent():
+    """20 MB go through the mail of most; with plotly's script of 2 MB, a page has at most 30."""
+    assert PageLimits().most_bytes + 2_000_000 <= 30_000_000
