@@ -6,6 +6,7 @@ from tdacoustic import __version__
 from tdacoustic.reporting.document import Column, Document, Facts, Notice, Section, Table
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
+from tdacoustic.reporting.sections.lineage import lineage_sections
 from tdacoustic.reporting.sections.what_if import what_if_section
 from tdacoustic.results import CampaignCalibration
 
@@ -25,11 +26,14 @@ def calibration_report(result: CampaignCalibration) -> Document:
         text = say("The levels come from signals made by a program. Nothing in this report was measured.")
         notices.append(Notice("synthetic", text))
     columns = (Column("file", say("File")), Column("sha256", "SHA-256"))
+    fit = calibration_section(result)
+    behind, lineage = lineage_sections([fit], (), result.inputs, {fit.id: result.records})
     provenance = Section(
         "provenance",
         say("How the numbers came about"),
         [
             Table("inputs", say("Inputs"), columns, [(file.written, file.sha256) for file in result.inputs]),
+            *behind,
             Section("versions", say("Versions"), [Facts(list(result.versions.items()))]),
         ],
     )
@@ -40,7 +44,8 @@ def calibration_report(result: CampaignCalibration) -> Document:
         origin=campaign.origin,
         summary=calibration_answer(result),
         notices=notices,
-        sections=[calibration_section(result), *(() if asked is None else (asked,)), provenance],
+        sections=[fit, *(() if asked is None else (asked,)), provenance],
         facts=[(say("Conditions"), ", ".join(campaign.conditions())), (say("Fleet"), result.fleet.name)],
         footer=[say("Made with tdacoustic {version}.", version=__version__), say("Levels re 20 µPa.")],
+        lineage=dict.fromkeys(("summary", fit.id, "what-if"), "provenance") | lineage,
     )

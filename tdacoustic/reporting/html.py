@@ -326,7 +326,10 @@ def render_html(document: Document, limits: PageLimits = PAGE_LIMITS) -> str:
     sections = _sections(document, views)
     figures = sum(isinstance(block, FigureBlock) for block in walk((*document.summary, *document.sections)))
     said = left_out_words(figures, views.interactive if views.full else figures, views.left_out, views.cut_tables)
-    document_notices = (*document.notices, *([Notice("info", said)] if said else []))
+    # the answer comes first: what is merely no longer zoomed is said at the end
+    lacks = bool(views.left_out or views.cut_tables)
+    notices = (*document.notices, *([Notice("info", said)] if lacks else []))
+    footer = (*document.footer, *([said] if said and not lacks else []))
     packed, plotly_hash = _plotly_script() if views.interactive else ("", "")
     script = _template("page.js")
     hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]
@@ -339,8 +342,8 @@ def render_html(document: Document, limits: PageLimits = PAGE_LIMITS) -> str:
             "subtitle": document.subtitle,
             "origin": document.origin,
             "facts": document.facts,
-            "notices": document_notices,
-            "footer": document.footer,
+            "notices": notices,
+            "footer": footer,
             "house": _house(document.house),
         },
         origin_words=say(ORIGIN_SENTENCES[document.origin]),

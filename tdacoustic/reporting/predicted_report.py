@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tdacoustic import __version__
 from tdacoustic.drive.prediction import Prediction
 from tdacoustic.reporting.document import Document, Section
@@ -16,6 +18,7 @@ from tdacoustic.reporting.sections.gear_pair import gear_pair
 from tdacoustic.reporting.sections.helix_sweep import helix_sweep
 from tdacoustic.reporting.sections.housing import housing_section
 from tdacoustic.reporting.sections.insertion_loss import insertion_loss_section
+from tdacoustic.reporting.sections.lineage import lineage_sections
 from tdacoustic.reporting.sections.mesh_stiffness import mesh_stiffness
 from tdacoustic.reporting.sections.meshing_noise import meshing_noise
 from tdacoustic.reporting.sections.model_parameters import model_parameters
@@ -44,12 +47,16 @@ def predicted_report(result: FleetPrediction) -> Document:
     result : FleetPrediction
     """
     prediction = result.prediction
+    sections, method = predicted_sections(result), gear_method(result)
+    whole = Section("prediction", say("What the model predicts"), [])
+    behind, came_from = lineage_sections([whole], (), result.inputs, {whole.id: result.records})
+    anchor = came_from.get(whole.id, method.id)
     return Document(
         title=result.fleet.name,
         subtitle=say("Noise and vibration of a traction drive: what the rapid model gives"),
         origin="calculated",
         summary=gear_answer(result),
-        sections=[*predicted_sections(result), gear_method(result)],
+        sections=[*sections, replace(method, blocks=[*method.blocks, *behind])],
         facts=[
             (say("Conditions"), ", ".join(state.condition.name for state in prediction.conditions)),
             (say("Train speeds"), _speeds_words(prediction)),
@@ -60,6 +67,7 @@ def predicted_report(result: FleetPrediction) -> Document:
             say("Levels re 20 µPa."),
             *map(say, PREDICTED_FOOTER),
         ],
+        lineage={"summary": anchor} | {section.id: anchor for section in sections},
     )
 
 
