@@ -243,7 +243,7 @@ class _Views:
         if isinstance(block, Sentences):
             return {"type": "sentences", "items": block.items}
         if isinstance(block, Notice):
-            return {"type": "notice", "kind": block.kind, "text": block.text}
+            return {"type": "notice", "kind": block.kind, "texts": [block.text]}
         if isinstance(block, Facts):
             return {"type": "facts", "pairs": block.pairs}
         if isinstance(block, FigureBlock):
@@ -266,6 +266,9 @@ class _Views:
     def blocks(self, blocks: Sequence[Block], level: int, number: str) -> list[dict[str, Any]]:
         views, below = [], 0
         for block in blocks:
+            if isinstance(block, Notice) and views and views[-1].get("kind") == block.kind:
+                views[-1]["texts"].append(block.text)  # one box for those of a kind that follow each other
+                continue
             below += isinstance(block, Section)
             views.append(self.block(block, level + 1, f"{number}.{below}" if number else ""))
         return views
@@ -342,7 +345,7 @@ def render_html(document: Document, limits: PageLimits = PAGE_LIMITS) -> str:
             "subtitle": document.subtitle,
             "origin": document.origin,
             "facts": document.facts,
-            "notices": notices,
+            "notices": views.blocks(notices, 2, ""),
             "footer": footer,
             "house": _house(document.house),
         },

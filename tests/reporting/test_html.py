@@ -244,3 +244,14 @@ def test_a_page_that_holds_no_more_rows_says_which_tables_it_cuts():
 def test_a_page_within_its_limits_can_be_sent():
     """20 MB go through the mail of most; with plotly's script of 2 MB, a page has at most 30."""
     assert PageLimits().most_bytes + 2_000_000 <= 30_000_000
+
+
+def test_notices_of_a_kind_that_follow_each_other_share_a_box():
+    said = [Notice("warning", "one"), Notice("warning", "two <b>"), Notice("info", "three"), Notice("warning", "four")]
+    page = render_html(Document("Report", "", "measured", sections=[Section("one", "One", said)]))
+    boxes = re.findall(r'<div class="notice notice-(\w+)".*?</span>(.*?)</div>', page, re.S)
+    assert boxes == [
+        ("warning", "<ul><li>one</li><li>two &lt;b&gt;</li></ul>"),
+        ("info", "<p>three</p>"),
+        ("warning", "<p>four</p>"),
+    ]
