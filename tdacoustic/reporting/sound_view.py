@@ -17,16 +17,16 @@ BESIDE: Final = 2.2
 """Distance of the marks from the line that they enclose, in percent of the strip's height."""
 
 
-def sound_view(block: Sound, number: int, used: int, most: int) -> tuple[int, dict[str, Any]]:
-    """Return the bytes of sound that the page then holds, and the view; without players once the page is full.
+def sound_view(block: Sound, number: int, most: int) -> tuple[int, dict[str, Any]]:
+    """Return the bytes of a sound and its view; without players where it is longer than what the page can take.
 
     Parameters
     ----------
     block : Sound
     number : int
         Of the sound in the page.
-    used, most : int
-        Bytes of sound that the page holds before, and may hold.
+    most : int
+        Bytes of sound that the page can take.
     """
     tracks = [
         {"label": track.label, "text": track.text, "mp3": Markup(base64.b64encode(track.mp3).decode("ascii"))}
@@ -34,7 +34,7 @@ def sound_view(block: Sound, number: int, used: int, most: int) -> tuple[int, di
     ]
     strip = None if block.strip is None else _strip(block.strip)
     size = sum(len(track["mp3"]) for track in tracks) + (0 if strip is None else len(strip["png"]))
-    fits = used + size <= most
+    fits = size <= most
     view = {
         "type": "sound",
         "number": number,
@@ -45,7 +45,7 @@ def sound_view(block: Sound, number: int, used: int, most: int) -> tuple[int, di
         "tracks": tracks if fits else [],
         "strip": strip if fits else None,
     }
-    return used + size if fits else used, view
+    return size if fits else 0, view
 
 
 def _strip(strip: SoundStrip) -> dict[str, Any]:

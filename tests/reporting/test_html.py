@@ -28,8 +28,10 @@ from tdacoustic.reporting import (
     Table,
 )
 from tdacoustic.reporting.document import ORIGINS
-from tdacoustic.reporting.html import csv_cell, render_html, safe_json
-from tdacoustic.reporting.page_limits import PageLimits
+from tdacoustic.reporting.html import render_html
+from tdacoustic.reporting.html_views import safe_json
+from tdacoustic.reporting.page_limits import Held, PageLimits, left_out_words
+from tdacoustic.tables.writing import csv_cell
 
 COLUMNS = (
     Column("channel", "Channel"),
@@ -170,8 +172,8 @@ def test_later_figures_are_still_pictures_and_the_page_says_so() -> None:
     assert page.count('<script type="application/json">{"data"') == 2
     assert "Of the 5 figures of this page the first 2 can be zoomed" in page
     assert page.count("A still picture") == 3
-    small = render_html(document(), PageLimits(figure_bytes=10))
-    assert 'id="plotly"' not in small and len(small) < 600_000
+    pictures = render_html(document(), PageLimits(interactive=0))
+    assert 'id="plotly"' not in pictures and len(pictures) < 600_000
 
 
 def test_a_page_without_figures_has_no_plotly() -> None:
@@ -212,38 +214,58 @@ def test_wrong_documents_are_refused() -> None:
 
 
 def test_a_page_that_holds_no_more_pictures_says_which_it_leaves_out():
-    blocks = [FigureBlock(spectrum(f"figure-{n}", f"word {n}", 301), "measured") for n in range(5)]
-    page = render_html(
-        Document("Report", "", "measured", sections=[Section("one", "One", blocks)]),
-        PageLimits(interactive=1, picture_bytes=40_000),
-    )
-    kept = page.count("data:image/png;base64,")
-    assert 1 <= kept < 5
-    assert page.count("Left out: the page holds no more pictures") == 5 - kept
-    assert f"The last {5 - kept} are left out" in page and "Figure 5. Spectrum word 4. Left out" in page
+    blocks = [FigureBlock(spectrum(f"figure-{n}", f"word {n}", 301), "measured") for n in range(40)]
+    report = Document("Report", "", "measured", sections=[Section("one", "One", blocks)])
+    whole = render_html(report)
+    assert whole.count("data:image/png;base64,") == 40 and "left out" not in whole
+    for most in (2_300_000, 2_700_000):
+        page = render_html(report, PageLimits(page_bytes=most))
+        assert 0.9 * most < len(page.encode()) <= most
+        kept = page.count("data:image/png;base64,")
+        zoomed = page.count('<script type="application/json">{"data"')
+        assert 1 <= zoomed < kept < 40
+        assert f"Of the 40 figures of this page the first {zoomed} can be zoomed" in page
+        assert page.count("Left out: the page holds no more pictures") == 1
+        assert f"The last {40 - kept} are left out" in page
+        for number in range(kept, 40):
+            assert f'<span id="fig-figure-{number}">Figure {number + 1}. Spectrum word {number}.</span>' in page
 
 
 def test_a_page_that_holds_no_more_rows_says_which_tables_it_cuts():
     columns = [Column("name", "Name"), Column("level_db", "Level", "dB", 1, "number")]
-    rows = [(f"name {n}", 60.0 + n) for n in range(500)]
+    rows = [(f"name {n}", 60.0 + n) for n in range(5000)]
     tables = [Table(f"t{n}", "Levels", columns, rows if n < 4 else rows[:5]) for n in range(5)]
-    page = render_html(
-        Document("Report", "", "measured", sections=[Section("one", "One", tables)]),
-        PageLimits(one_table_bytes=6_000, table_bytes=14_000),
-    )
+    report = Document("Report", "", "measured", sections=[Section("one", "One", tables)])
+    page = render_html(report, PageLimits(page_bytes=400_000, tables=0.5, one_table=0.2))
+    assert len(page.encode()) <= 400_000
     kept = [part.count("<tr>") - 1 for part in page.split("<table>")[1:]]  # less the head
-    # a row has a name of 6 to 8 signs, a level of 4, perhaps its raw value, and two cells' marks
-    assert 6_000 / (8 + 5 + 5 + 24) - 1 < kept[0] == kept[1] < 6_000 / (6 + 4 + 24) + 1
-    assert kept[0] > kept[2] >= 12 and kept[3] == 12 and kept[4] == 5
+    assert 500 < kept[0] == kept[1] < 5000  # 0.2 of nearly 0.4 MB, at about 70 bytes a row
+    assert kept[0] > kept[2] > kept[3] == 12 and kept[4] == 5
     for count in kept[:4]:
-        assert f"The first {count} of 500 rows: the page holds no more." in page
+        assert f"The first {count} of 5000 rows: the page holds no more." in page
     assert "Of 4 long tables the first rows alone are shown" in page
-    assert "long tables" not in render_html(Document("Report", "", "measured", sections=[Section("o", "O", tables)]))
+    assert "long tables" not in render_html(report)
 
 
-def test_a_page_within_its_limits_can_be_sent():
-    """20 MB go through the mail of most; with plotly's script of 2 MB, a page has at most 30."""
-    assert PageLimits().most_bytes + 2_000_000 <= 30_000_000
+def test_tables_and_sounds_that_are_small_leave_their_room_to_the_figures():
+    limits = PageLimits(page_bytes=10_000_000)
+    first = limits.room(2_000_000)
+    assert first.figures + first.tables + first.sounds <= 8_000_000
+    again = limits.room(2_000_000, Held(table_bytes=100_000, left_out=3))
+    assert again.figures == pytest.approx(first.figures + first.tables + first.sounds - 100_000, abs=2)
+    assert again.zoomed < again.figures == limits.room(2_000_000, Held(table_bytes=100_000)).zoomed
+
+
+def test_what_a_page_lacks_is_said():
+    assert left_out_words(Held(zoomed=3)) == ""
+    assert not Held(zoomed=3, still=2).lacks  # pictures are all there
+    assert left_out_words(Held(silent=1)) == "One sound is left out: the page holds no more."
+    assert left_out_words(Held(silent=2)) == "2 sounds are left out: the page holds no more."
+
+
+def test_a_page_can_be_sent():
+    """Below what the mail of most takes, 20 MB as sent: four thirds of the file's size."""
+    assert PageLimits().page_bytes * 4 / 3 <= 20_000_000
 
 
 def test_notices_of_a_kind_that_follow_each_other_share_a_box():
