@@ -1,15 +1,13 @@
 """Draw a `Figure` with matplotlib: pictures for print, for files and for notebooks.
 
-Only matplotlib's object interface is used, so nothing is left behind in its global state.
-The same figure gives the same bytes.
+Only matplotlib's object interface is used, so nothing is left behind in its global state but the name of the font for
+Chinese, which no other program asks for. The same figure gives the same bytes.
 """
 
 from __future__ import annotations
 
 import io
 import math
-import warnings
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -30,6 +28,7 @@ from tdacoustic.reporting.layout import (
     tick_text,
     wrapped,
 )
+from tdacoustic.reporting.matplotlib_style import drawing_style
 from tdacoustic.reporting.palette import colour
 
 if TYPE_CHECKING:
@@ -51,40 +50,6 @@ _LONGEST_CATEGORY: Final = 48
 
 _DASH: Final[dict[str, Any]] = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.8)), "steps": "-"}
 _SYMBOL: Final = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "cross": "+", "x": "x"}
-_STYLE: Final[dict[str, Any]] = {
-    "font.family": ["DejaVu Sans"],
-    "font.size": 7.5,
-    "axes.labelsize": 8,
-    "axes.linewidth": 0.6,
-    "axes.edgecolor": colour("axis"),
-    "axes.labelcolor": colour("ink"),
-    "axes.axisbelow": True,
-    "axes.unicode_minus": True,
-    "text.color": colour("ink"),
-    "text.parse_math": False,
-    "xtick.color": colour("axis"),
-    "ytick.color": colour("axis"),
-    "xtick.labelcolor": colour("ink"),
-    "ytick.labelcolor": colour("ink"),
-    "xtick.major.width": 0.6,
-    "ytick.major.width": 0.6,
-    "xtick.major.size": 3,
-    "ytick.major.size": 3,
-    "grid.color": colour("grid"),
-    "grid.linewidth": 0.6,
-    "legend.frameon": False,
-    "legend.fontsize": 7.5,
-    "lines.solid_joinstyle": "round",
-    "path.simplify": True,
-    "svg.hashsalt": "tdacoustic",
-    "svg.fonttype": "path",
-}
-
-
-def _style() -> AbstractContextManager[None]:
-    import matplotlib
-
-    return matplotlib.rc_context(cast(Any, _STYLE))
 
 
 def _steps(x: FloatArray, y: FloatArray, log: bool) -> tuple[FloatArray, FloatArray]:
@@ -292,7 +257,8 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
         """A figure that a notebook shows by itself."""
 
         def _repr_png_(self) -> bytes:
-            return _png(self, 150)
+            with drawing_style():
+                return _png(self, 150)
 
     width, height = printed_size(figure)
     canvas = NotebookFigure(figsize=(width / 72.0, height / 72.0), layout="constrained")
@@ -356,14 +322,14 @@ def render_png(figure: Figure, dpi: int = 200, colours: int | None = None) -> by
     bytes
         The same for the same figure, matplotlib and Pillow.
     """
-    with _style():
+    with drawing_style():
         return _png(_draw(figure, title=False, coarse=colours is not None), dpi, colours)
 
 
 def render_svg(figure: Figure) -> str:
     """Draw a figure as SVG text, the letters as outlines; maps are embedded as pictures."""
     raw = io.BytesIO()
-    with _style():
+    with drawing_style():
         canvas = _draw(figure, title=False)
         canvas.savefig(raw, format="svg", dpi=200, metadata={"Date": None, "Creator": None})
     return raw.getvalue().decode("utf-8")
@@ -396,8 +362,7 @@ def draw_with(figure: Figure, renderer: RendererBase, dpi: int, lines: bool = Tr
     """
     from matplotlib.backends.backend_mixed import MixedModeRenderer
 
-    with _style(), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", "Glyph .* missing")  # the renderer's own fonts may have it
+    with drawing_style():
         canvas = _draw(figure, title=False)
         for artist in () if lines else (*canvas.axes[0].lines, *canvas.axes[0].collections):
             artist.set_rasterized(True)
@@ -437,7 +402,7 @@ def plot(figure: Figure, path: str | Path | None = None) -> MatplotlibFigure:
     suffix = Path(path).suffix.lower() if path is not None else ".png"
     if suffix not in (".png", ".svg", ".pdf"):
         raise ReportError(f"a figure is written as .png, .svg or .pdf, got {path}")
-    with _style():
+    with drawing_style():
         canvas = _draw(figure, title=True)
         if path is not None:
             stamp = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}[suffix]

@@ -41,7 +41,7 @@ def test_a_sign_that_no_font_has_is_named() -> None:
 
 
 def test_without_the_font_for_chinese_the_text_stays_and_the_file_says_what_it_needs(monkeypatch) -> None:
-    monkeypatch.setattr(fonts, "_noto_file", lambda: None)
+    monkeypatch.setattr(fonts, "chinese_font", lambda: None)
     file = read("株洲 \U00020000 шум")
     assert "株洲[U+20000]шум" in tight(file.pdfium_text())
     assert file.fonts()["/STSong-Light"] is False

@@ -1,8 +1,7 @@
 """The fonts of the PDF: DejaVu for nearly all text, Noto Sans SC for Chinese, a code for what neither can show.
 
-DejaVu comes with matplotlib and has Latin, Greek, Cyrillic and the signs of the trade. Noto Sans SC comes with the
-extra ``pdf``; where its package is missing, Chinese is set in a font that the reader's program must have. Fonts that
-are embedded hold no more than the signs that are used.
+`tdacoustic.reporting.font_files` says where they come from. Where the package of Noto Sans SC is missing, Chinese is
+set in a font that the reader's program must have. Fonts that are embedded hold no more than the signs that are used.
 """
 
 from __future__ import annotations
@@ -19,6 +18,8 @@ from typing import Any, Final
 from reportlab.pdfbase import pdfmetrics
 from reportlab.pdfbase.cidfonts import UnicodeCIDFont
 from reportlab.pdfbase.ttfonts import TTFont
+
+from tdacoustic.reporting.font_files import chinese_font, dejavu_folder
 
 __all__ = ["BOLD", "REGULAR", "Fonts", "plain", "prepared"]
 
@@ -111,12 +112,12 @@ def prepared(texts: Iterable[str]) -> Fonts:
     """
     for name, file in _FILES.items():
         if name not in pdfmetrics.getRegisteredFontNames():
-            pdfmetrics.registerFont(TTFont(name, str(_dejavu_folder() / file)))
+            pdfmetrics.registerFont(TTFont(name, str(dejavu_folder() / file)))
     known = _signs(REGULAR) & _signs(BOLD)
     signs = {sign for text in texts for sign in plain(text)}
     undrawn = {sign for sign in signs if unicodedata.category(sign) in _NOT_DRAWN}
     others = {sign for sign in signs - undrawn if ord(sign) not in known}
-    source = _noto_file()
+    source = chinese_font()
     has = _in_gbk if source is None else (lambda sign: ord(sign) in _noto_signs(source))
     shown = frozenset(sign for sign in others if has(sign))
     coded = bool(undrawn | others - shown)
@@ -144,21 +145,6 @@ def _in_gbk(sign: str) -> bool:
 def _signs(font: str) -> frozenset[int]:
     """Code points that a registered font has."""
     return frozenset(code for code in pdfmetrics.getFont(font).face.charToGlyph if 0x20 <= code <= _LAST)
-
-
-def _dejavu_folder() -> Path:
-    import matplotlib
-
-    return Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-
-
-def _noto_file() -> Path | None:
-    try:
-        from pylopdf_fonts_zh_cn import sans_path
-    except ImportError:
-        return None
-    path = Path(sans_path())
-    return path if path.is_file() else None
 
 
 @cache
