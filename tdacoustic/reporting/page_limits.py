@@ -121,8 +121,9 @@ class PageLimits:
         else:
             spare = max(free - tried.all_bytes, 0)
             sounds += 0 if tried.left_out else int(0.9 * spare)
-            needed = min(tried.table_bytes, tables) + (sounds if tried.silent else min(tried.sound_bytes, sounds))
-            figures = free - needed
+            # the first rows of many tables can need more than their share
+            needed = tried.table_bytes + (sounds if tried.silent else tried.sound_bytes)
+            figures = max(free - needed, 0)
             zoomed = int(self.zoomed * free) if tried.left_out else figures
         return Room(tables, int(self.one_table * free), sounds, figures, zoomed)
 

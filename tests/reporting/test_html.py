@@ -256,6 +256,16 @@ def test_tables_and_sounds_that_are_small_leave_their_room_to_the_figures():
     assert again.zoomed < again.figures == limits.room(2_000_000, Held(table_bytes=100_000)).zoomed
 
 
+def test_many_tables_of_few_rows_leave_the_page_below_its_limit():
+    columns = [Column(f"c{n}", "Level", "dB", 1, "number") for n in range(10)]
+    tables = [Table(f"t{n}", "Levels", columns, [[60.0] * 10] * 11) for n in range(300)]  # 1 MB of rows never cut
+    figures = [FigureBlock(spectrum(f"figure-{n}", f"word {n}", 301), "measured") for n in range(40)]
+    report = Document("Report", "", "measured", sections=[Section("one", "One", [*tables, *figures])])
+    page = render_html(report, PageLimits(page_bytes=4_500_000))
+    assert 4_200_000 < len(page.encode()) <= 4_500_000
+    assert 0 < page.count("data:image/png;base64,") < 40
+
+
 def test_what_a_page_lacks_is_said():
     assert left_out_words(Held(zoomed=3)) == ""
     assert not Held(zoomed=3, still=2).lacks  # pictures are all there
