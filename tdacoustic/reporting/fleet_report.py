@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from tdacoustic import __version__
 from tdacoustic.gathering.gathered import Gathering
-from tdacoustic.reporting.document import Document, Fact, Notice
+from tdacoustic.reporting.document import Document, Fact, Notice, Section
 from tdacoustic.reporting.language import say, say_count
 from tdacoustic.reporting.measured_report import MEASURED_FOOTER
 from tdacoustic.reporting.sections.campaigns_answer import campaigns_answer
 from tdacoustic.reporting.sections.campaigns_dominance import campaigns_dominance
 from tdacoustic.reporting.sections.campaigns_levels import campaigns_levels
+from tdacoustic.reporting.sections.campaigns_lineage import FILES_OF, files_behind, results_behind
 from tdacoustic.reporting.sections.campaigns_list import campaigns_list, campaigns_sources
 from tdacoustic.reporting.sections.campaigns_outliers import campaigns_outliers
 from tdacoustic.reporting.sections.campaigns_parameters import campaigns_parameters
@@ -32,23 +33,26 @@ def fleet_report(gathering: Gathering) -> Document:
     made, held = len(gathering.of_origin("synthetic")), len(gathering.results)
     if made:
         notices.append(Notice("synthetic", _made_words(made, held)))
-    found = [
+    found = (
         campaigns_dominance(gathering),
         campaigns_levels(gathering),
         campaigns_parameters(gathering),
         campaigns_outliers(gathering),
         campaigns_quality(gathering),
         campaigns_list(gathering),
-        campaigns_sources(gathering),
-    ]
+    )
+    sections = [section for section in found if section is not None]
+    sources = campaigns_sources(gathering)
+    behind = Section(sources.id, sources.title, [*files_behind(sections), results_behind(gathering), *sources.blocks])
     return Document(
         title=say("Fleet view"),
         subtitle=say("Noise and vibration of traction drives: what the results of many campaigns say together"),
         origin=origins[0] if len(origins) == 1 else "mixed",
         summary=campaigns_answer(gathering),
         notices=notices,
-        sections=[section for section in found if section is not None],
+        sections=[*sections, behind],
         facts=_facts(gathering),
+        lineage={section.id: behind.id for section in sections if section.id in FILES_OF},
         footer=[say("Made with tdacoustic {version}.", version=__version__), *map(say, MEASURED_FOOTER)],
     )
 

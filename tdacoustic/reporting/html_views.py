@@ -240,7 +240,8 @@ class Views:
 
     def blocks(self, blocks: Sequence[Block], level: int, number: str) -> list[dict[str, Any]]:
         """Return the views of blocks under a heading of a level and number."""
-        views, below = [], 0
+        views: list[dict[str, Any]] = []
+        below = 0
         for block in blocks:
             if isinstance(block, Notice) and views and views[-1].get("kind") == block.kind:
                 views[-1]["texts"].append(block.text)  # one box for those of a kind that follow each other

@@ -4,13 +4,14 @@ import html.parser
 import re
 
 import pytest
-from made_up_results import calibration, fitted, level, made_result, many_results, quality, stated, verdict
+from made_up_results import calibration, fitted, level, made_result, many_results, quality, sha, stated, verdict
 
 from tdacoustic.reporting import ReportError
 from tdacoustic.reporting.document import FigureBlock, Link, Notice, Paragraph, Sentences, Table, walk
 from tdacoustic.reporting.figure import Axis, Line, Markers
 from tdacoustic.reporting.fleet_report import fleet_report
 from tdacoustic.reporting.html import render_html
+from tdacoustic.reporting.sections.campaigns_lineage import FILES_OF
 from tdacoustic.reporting.sections.campaigns_rows import MOST_POINTS, MOST_ROWS
 
 pytest.importorskip("pyarrow", reason="tables of results are read with pyarrow")
@@ -83,10 +84,32 @@ def test_origins_are_told_apart_everywhere(mixed):
         assert block.origin in block.figure.title
     for found in blocks_of(mixed, Table):
         kinds = {column.kind for column in found.columns}
-        no_numbers_of_campaigns = found.name in ("dataset",)
+        no_numbers_of_campaigns = found.name in ("dataset", "files-behind")
         assert found.origin is not None or "origin" in kinds or no_numbers_of_campaigns, found.name
     assert [row[1] for row in table(mixed, "dominance-matrix").rows] == ["measured", "measured", "synthetic"]
     assert "1 of 5 campaigns here was made by a program; nothing in it was measured." in words(mixed)
+
+
+def test_each_section_leads_to_the_files_and_each_result_to_its_inputs(tmp_path):
+    from tdacoustic.gathering.contracts import COPIED
+
+    logs = [sha(f"log {number}") for number in range(4)]
+    made_result(tmp_path / "a", name="a", levels=[level("20", 20.0, 80.0)], quality=[quality("20")], inputs=logs)
+    document = fleet_report(gathered(tmp_path))
+    read = {f"{name}.csv" for name in COPIED} | {"quality.csv", "calibration.json", "manifest.json"}
+    assert {file for files in FILES_OF.values() for file in files} <= read
+    page = render_html(document)
+    assert page.count('class="behind" href="#sources"') >= 3
+    for section in document.sections[:-1]:
+        inside = page.split(f'<section id="{section.id}"')[1].split("</section>")[0]
+        shown = inside.count('<figure class="figure"') + inside.count('<figure class="table')
+        assert inside.count('class="behind" href="#sources"') == shown, section.id
+    titles = {section.title for section in document.sections}
+    assert titles >= {row[0] for row in table(document, "files-behind").rows}
+    (row,) = table(document, "results-behind").rows
+    campaign_file = sha("aa")
+    assert row[-1] == " ".join(digits[:12] for digits in (campaign_file, *logs[:2])) + " …"
+    assert row[5] == 5 and row[6] == pytest.approx(4.5e-3)
 
 
 def test_the_matrix_has_the_word_the_probability_and_the_way_to_the_report(mixed):
