@@ -159,7 +159,7 @@ def info(
     logs: Logs,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
     every_sample: Annotated[bool, typer.Option("--all", help="Read every sample of a large log too.")] = False,
-    quiet: Quiet = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no progress.")] = False,
 ) -> None:
     """Say what is in a log, in its own units; a large log is read in short stretches."""
     from tdacoustic.workflows.info import describe_log, info_text

@@ -38,7 +38,7 @@ class Agreement:
     Parameters
     ----------
     word : str
-        ``agree``: all that speak lead to one source; ``disagree``: two that are sure lead to different ones;
+        ``agree``: no two that are sure lead to different sources (unsure ones may); ``disagree``: two do;
         ``single``: one alone speaks; ``silent``: none.
     source : str or None
         Most probable by all that speak; None where they disagree or are silent.

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from tdacoustic import __version__
-from tdacoustic.reporting.document import Column, Document, Facts, Notice, Section, Table
+from tdacoustic.reporting.document import Document, Notice, Section
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
-from tdacoustic.reporting.sections.lineage import lineage_sections
+from tdacoustic.reporting.sections.lineage import behind_a_fit, lineage_sections
+from tdacoustic.reporting.sections.provenance import inputs_of, settings_in_force, settings_of, stated_by, versions_of
 from tdacoustic.reporting.sections.what_if import what_if_section
 from tdacoustic.results import CampaignCalibration
 
@@ -25,16 +26,20 @@ def calibration_report(result: CampaignCalibration) -> Document:
     if campaign.origin == "synthetic":
         text = say("The levels come from signals made by a program. Nothing in this report was measured.")
         notices.append(Notice("synthetic", text))
-    columns = (Column("file", say("File")), Column("sha256", "SHA-256"))
+    in_force = settings_in_force(campaign, result)
+    asked_of_fit = {key: value for key, value in in_force.items() if key.startswith("calibration.")}
     fit = calibration_section(result)
-    behind, lineage = lineage_sections([fit], (), result.inputs, {fit.id: result.records})
+    behind, lineage = lineage_sections(
+        [fit], (), result.inputs, {fit.id: behind_a_fit(result)}, ("settings", "versions")
+    )
     provenance = Section(
         "provenance",
         say("How the numbers came about"),
         [
-            Table("inputs", say("Inputs"), columns, [(file.written, file.sha256) for file in result.inputs]),
+            *inputs_of(result.inputs),
+            settings_of(asked_of_fit, stated_by(campaign)),
             *behind,
-            Section("versions", say("Versions"), [Facts(list(result.versions.items()))]),
+            versions_of(result.versions),
         ],
     )
     asked = None if result.what_if is None else what_if_section(result.what_if, result.calibration.fleet)

@@ -36,6 +36,7 @@ __all__ = [
     "Paragraph",
     "Section",
     "Sentences",
+    "Shown",
     "Sound",
     "SoundStrip",
     "SoundTrack",
@@ -75,7 +76,40 @@ class Link:
             raise ReportError(f"a link must be a relative path in the signs of URLs, got {self.href!r}")
 
 
-Cell: TypeAlias = str | float | int | bool | Link | None
+@dataclass(frozen=True)
+class Shown:
+    """A cell whose number is shown in words: an interval, a bound, a probability that is never 1.
+
+    The download has both, the number under the column's key and the words under the key with ``_text`` behind it.
+
+    Parameters
+    ----------
+    text : str
+        What is read, ``"> 0.99"``; said in the reader's language already.
+    value : float or None
+        The number itself, ``0.9973``; None (also NaN) where there is none: refused, or nothing but a bound known.
+    order : float or None
+        What it is sorted by where `value` is None: that of the bound. A bound is no value, so it is not downloaded as
+        one. Where both are None it comes last, whichever way the column is sorted.
+
+    Examples
+    --------
+    >>> Shown("> 0.99", 0.9973).value, Shown("< 61.2", order=61.2).value
+    (0.9973, None)
+    """
+
+    text: str
+    value: float | None = None
+    order: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("value", "order"):
+            number = getattr(self, name)
+            plain = None if number is None or not math.isfinite(number) else float(number)
+            object.__setattr__(self, name, plain)
+
+
+Cell: TypeAlias = str | float | int | bool | Link | Shown | None
 
 
 def _check_origin(origin: str | None, what: str) -> None:
@@ -198,7 +232,7 @@ class Table:
     columns : sequence of Column
         At least one, with different keys.
     rows : sequence of sequences
-        One cell a column: text, number, bool, `Link`, or None (also NaN) for not determined.
+        One cell a column: text, number, bool, `Link`, `Shown`, or None (also NaN) for not determined.
     csv : str, optional
         Name of the download; default ``<name>.csv``.
     origin : str, optional
@@ -207,7 +241,7 @@ class Table:
     Raises
     ------
     ReportError
-        A row has not as many cells as there are columns, or a number column holds text.
+        A row has not as many cells as there are columns, a number column holds text, or another a number in words.
     """
 
     name: str
@@ -230,6 +264,8 @@ class Table:
             for column, cell in zip(columns, row, strict=True):
                 if column.kind == "number" and isinstance(cell, str | Link):
                     raise ReportError(f"column {column.key!r} of table {self.name!r} is of numbers, got {cell!r}")
+                if column.kind != "number" and isinstance(cell, Shown):
+                    raise ReportError(f"column {column.key!r} of table {self.name!r} is not of numbers, got {cell!r}")
                 if column.kind == "origin" and cell is not None:
                     _check_origin(str(cell), f"row {number} of table {self.name!r}")
         object.__setattr__(self, "columns", columns)
@@ -246,9 +282,9 @@ def _plain(cell: object) -> Cell:
     value = cell.item() if hasattr(cell, "item") else cell
     if isinstance(value, float) and not math.isfinite(value):
         return None
-    if value is None or isinstance(value, str | bool | int | float | Link):
+    if value is None or isinstance(value, str | bool | int | float | Link | Shown):
         return value
-    raise ReportError(f"a cell is text, a number, a bool, a link or None, got {value!r}")
+    raise ReportError(f"a cell is text, a number, a bool, a link, a number in words or None, got {value!r}")
 
 
 @dataclass(frozen=True)

@@ -109,10 +109,10 @@ def render_html(document: Document, limits: PageLimits = PAGE_LIMITS) -> str:
 def _page(document: Document, views: Views) -> str:
     sections = _sections(document, views)
     said = left_out_words(views.held)
-    # the answer comes first: what is merely no longer zoomed is said at the end
-    lacks = views.held.lacks
-    notices = (*document.notices, *([Notice("info", said)] if lacks else []))
-    footer = (*document.footer, *([said] if said and not lacks else []))
+    # the answer comes first, then what is not here; what is merely no longer zoomed is said at the end
+    if views.held.lacks:
+        sections[0]["blocks"] += views.blocks([Notice("info", said)], 2, "")
+    footer = (*document.footer, *([said] if said and not views.held.lacks else []))
     packed, plotly_hash = _plotly_script() if views.held.zoomed else ("", "")
     script = _template("page.js")
     hashes = [_script_hash(script.encode("utf-8")), *([plotly_hash] if packed else [])]
@@ -125,7 +125,7 @@ def _page(document: Document, views: Views) -> str:
             "subtitle": document.subtitle,
             "origin": document.origin,
             "facts": document.facts,
-            "notices": views.blocks(notices, 2, ""),
+            "notices": views.blocks(document.notices, 2, ""),
             "footer": footer,
             "house": _house(document.house),
         },

@@ -24,6 +24,7 @@ from tdacoustic.reporting.document import (
     Paragraph,
     Section,
     Sentences,
+    Shown,
     Sound,
     Table,
 )
@@ -58,15 +59,24 @@ def safe_json(value: object) -> str:
 
 
 def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
-    """What a cell shows, and what it sorts and downloads as (``raw``; None: the same)."""
+    """What a cell shows, and what it sorts and downloads as (``raw``; None: the same).
+
+    ``order``: what it is sorted by where that is something else; ``words``: what its text downloads as, for a number
+    in words.
+    """
     align = column.align or ("right" if column.kind == "number" else "left")
     tag = 'th scope="row"' if first and column.kind == "text" else "td"
-    view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align, "chip": None, "href": None}
+    view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align}
+    view |= dict.fromkeys(("chip", "href", "order", "words"))
     view["text"] = text = cell_text(column, cell)
     if cell is None:
         return view | {"raw": ""}
     if isinstance(cell, Link):
         return view | {"href": cell.href, "raw": _raw(cell.text, text)}
+    if isinstance(cell, Shown):
+        order = None if cell.order is None or cell.value is not None else f"{cell.order:.9g}"
+        raw = "" if cell.value is None else f"{cell.value:.9g}"
+        return view | {"raw": raw, "order": order, "words": _raw(cell.text, text)}
     if isinstance(cell, bool):
         return view | {"raw": "true" if cell else "false"}
     if not isinstance(cell, str):
@@ -96,8 +106,9 @@ def _table(table: Table, most_bytes: int) -> tuple[dict[str, Any], int]:
             "unit": column.unit,
             "kind": column.kind,
             "align": column.align or ("right" if column.kind == "number" else "left"),
+            "worded": any(isinstance(row[place], Shown) for row in table.rows),
         }
-        for column in table.columns
+        for place, column in enumerate(table.columns)
     ]
     made = (
         [_cell(column, cell, index == 0) for index, (column, cell) in enumerate(zip(table.columns, row, strict=True))]

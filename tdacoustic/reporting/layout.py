@@ -22,9 +22,11 @@ __all__ = [
     "cell_edges",
     "cut_text",
     "figure_width",
+    "in_lines",
     "label_heights",
     "log_ticks",
     "place_labels",
+    "text_columns",
     "tick_text",
     "wrapped",
 ]
@@ -188,10 +190,44 @@ def cut_text(text: str, columns: int) -> str:
     """
     taken = 0
     for place, sign in enumerate(text):
-        taken += 2 if unicodedata.east_asian_width(sign) in "WF" else 1
+        taken += text_columns(sign)
         if taken > columns:
             return f"{text[: place - 1]}…"
     return text
+
+
+def text_columns(text: str) -> int:
+    """Return how many columns a text takes; Chinese signs take two.
+
+    Examples
+    --------
+    >>> text_columns("mic"), text_columns("麦克")
+    (3, 4)
+    """
+    return sum(2 if unicodedata.east_asian_width(sign) in "WF" else 1 for sign in text)
+
+
+def in_lines(text: str, columns: int, most: int) -> list[str]:
+    """Break a text into lines of so many columns, within words where these are longer; the last one allowed is cut.
+
+    Examples
+    --------
+    >>> in_lines("pinion bearing stiffness", 10, 3), in_lines("Getriebegehaeuse", 10, 3), in_lines("a b c d", 1, 2)
+    (['pinion', 'bearing', 'stiffness'], ['Getriebege', 'haeuse'], ['a', '…'])
+    """
+    lines = [""]
+    for word in text.split():
+        joined = f"{lines[-1]} {word}".strip()
+        if text_columns(joined) <= columns:
+            lines[-1] = joined
+            continue
+        lines += [""] if lines[-1] else []
+        for sign in word:
+            lines += [""] if text_columns(lines[-1] + sign) > columns and lines[-1] else []
+            lines[-1] += sign
+    if len(lines) <= most:
+        return lines
+    return [*lines[: most - 1], cut_text(f"{lines[most - 1]}{lines[most]}", columns)]
 
 
 def label_heights(markers: Markers) -> FloatArray:

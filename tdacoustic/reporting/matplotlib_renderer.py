@@ -28,6 +28,7 @@ from tdacoustic.reporting.layout import (
     tick_text,
     wrapped,
 )
+from tdacoustic.reporting.matplotlib_names import LONGEST_NAME, legend_height, set_categories, set_legend
 from tdacoustic.reporting.matplotlib_style import drawing_style
 from tdacoustic.reporting.palette import colour
 
@@ -40,13 +41,11 @@ __all__ = ["draw_with", "is_thinned", "plot", "printed_size", "render_png", "ren
 
 WIDTH_IN: Final = 7.2
 """Width of a printed figure: the text width of a page of A4."""
-INCHES_PER_PIXEL: Final = WIDTH_IN / COLUMN_WIDTH
+POINTS_PER_PIXEL: Final = 72.0 * (WIDTH_IN / COLUMN_WIDTH)
 """A figure as wide as the page's column is printed `WIDTH_IN` wide."""
 MAX_POINTS: Final = 6000
 MAX_CELLS: Final = (800, 500)
 """Cells of a map along x and y; each shows the maximum of those it stands for."""
-_LONGEST_CATEGORY: Final = 48
-"""Columns of the name of a category or of a place along an axis; longer ones would leave no room for the plot."""
 
 _DASH: Final[dict[str, Any]] = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.8)), "steps": "-"}
 _SYMBOL: Final = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "cross": "+", "x": "x"}
@@ -174,21 +173,10 @@ def _set_axis(axes: Axes, axis: Axis, which: str, limits: tuple[float, float], r
             one.set_major_formatter(FuncFormatter(lambda value, _: tick_text(value)))
             one.set_minor_locator(NullLocator())
     if axis.names:
-        one.set_ticks(range(len(axis.names)), [cut_text(name, _LONGEST_CATEGORY) for name in axis.names])
+        one.set_ticks(range(len(axis.names)), [cut_text(name, LONGEST_NAME) for name in axis.names])
     ends = tuple(10.0**end for end in limits) if axis.log else limits
     (axes.set_xlim if which == "x" else axes.set_ylim)(*ends)
     (axes.set_xlabel if which == "x" else axes.set_ylabel)("\n".join(wrapped(axis.caption, room, 4.3)))
-
-
-def _set_legend(canvas: MatplotlibFigure, axes: Axes, width: float) -> None:
-    handles, names = axes.get_legend_handles_labels()
-    if len(names) < 2:
-        return
-    room = width - 40
-    names = [cut_text(name, int((room - 34) / 4.6)) for name in names]
-    widths = [len(name) * 4.2 + 34 for name in names]
-    columns = max(1, min(len(names), int(room / max(widths))))
-    canvas.legend(handles, names, loc="outside upper left", ncols=columns, handlelength=1.8, columnspacing=1.6)
 
 
 def _draw_labels(canvas: MatplotlibFigure, axes: Axes, figure: Figure) -> None:
@@ -241,12 +229,14 @@ def _draw_labels(canvas: MatplotlibFigure, axes: Axes, figure: Figure) -> None:
 def printed_size(figure: Figure) -> tuple[float, float]:
     """Return how wide and high a figure is printed, in points (1/72 inch): `WIDTH_IN` and what its height makes of it.
 
+    It is higher where its legend has many rows.
+
     Parameters
     ----------
     figure : Figure
     """
-    width, height = (72.0 * INCHES_PER_PIXEL * pixels for pixels in (figure_width(figure), figure.height))
-    return width, height
+    width, height = (POINTS_PER_PIXEL * pixels for pixels in (figure_width(figure), figure.height))
+    return width, height + legend_height(figure, width)
 
 
 def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure:
@@ -268,22 +258,16 @@ def _draw(figure: Figure, title: bool, coarse: bool = False) -> MatplotlibFigure
     _draw_elements(axes, figure, coarse)
     x_range, y_range = axis_ranges(figure)
     _set_axis(axes, figure.x_axis, "x", x_range, width - 60)
-    _set_axis(axes, figure.y_axis, "y", y_range, height - 44)
+    _set_axis(axes, figure.y_axis, "y", y_range, POINTS_PER_PIXEL * figure.height - 44)
     if figure.equal:
         axes.set_aspect("equal", adjustable="box")
     heat = any(isinstance(element, Heatmap) for element in figure.elements)
     axes.grid(not heat, axis="y" if figure.categories else "both")
     if figure.categories:
-        crowded = sum(len(name) + 2 for name in figure.categories) * 4.2 > width - 60
-        names = [cut_text(name, _LONGEST_CATEGORY) for name in figure.categories]
-        axes.set_xticks(range(len(names)), names, rotation=45 if crowded else 0)
-        axes.tick_params(axis="x", length=0)
-        if crowded:
-            for label in axes.get_xticklabels():
-                label.set(ha="right", rotation_mode="anchor")
+        set_categories(axes, figure.categories, width, height)
     if title:
         axes.set_title(figure.title, loc="left", fontsize=8.5, fontweight="bold")
-    _set_legend(canvas, axes, width)
+    set_legend(canvas, axes, width)
     _draw_labels(canvas, axes, figure)
     return canvas
 

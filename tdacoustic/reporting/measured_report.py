@@ -44,7 +44,9 @@ def measured_report(analysis: Analysis) -> Document:
         text = say("Every number of this report comes from signals made by a program. Nothing in it was measured.")
         notices.append(Notice("synthetic", text))
     sections = measured_sections(analysis)
-    behind, lineage = lineage_sections(sections, analysis.records, analysis.inputs)
+    behind, lineage = lineage_sections(
+        sections, analysis.records, analysis.inputs, beside=("settings", "method", "versions")
+    )
     return Document(
         title=campaign.name,
         subtitle=say("Noise and vibration of a traction drive: what the recordings show"),

@@ -159,21 +159,25 @@ def left_out_words(held: Held) -> str:
     held : Held
     """
     said = []
-    if held.still or held.left_out:
+    if held.left_out:
+        said.append(
+            say(
+                "Of the {all} figures of this report the first {zoomed} can be zoomed, the next {still} are still "
+                "pictures, and the last {left_out} are left out, which keeps the page small; what those show is in "
+                "result.h5 and the tables.",
+                all=held.zoomed + held.still + held.left_out,
+                zoomed=held.zoomed,
+                still=held.still,
+                left_out=held.left_out,
+            )
+        )
+    elif held.still:
         said.append(
             say(
                 "Of the {all} figures of this page the first {count} can be zoomed; the others are still pictures, "
                 "which keeps the page small.",
-                all=held.zoomed + held.still + held.left_out,
+                all=held.zoomed + held.still,
                 count=held.zoomed,
-            )
-        )
-    if held.left_out:
-        said.append(
-            say_count(
-                "The last one is left out; what it shows is in result.h5 and the tables.",
-                "The last {count} are left out; what they show is in result.h5 and the tables.",
-                held.left_out,
             )
         )
     if held.cut_tables:

@@ -16,7 +16,7 @@ from tdacoustic.reporting.decimate import drawn
 from tdacoustic.reporting.figure import Axis, Band, Bars, Element, Figure, Heatmap, Line, Markers, Rule
 from tdacoustic.reporting.layout import Label, axis_ranges, label_heights, log_ticks, place_labels, tick_text, wrapped
 from tdacoustic.reporting.palette import Scheme, colour
-from tdacoustic.reporting.plotly_traces import MAX_COLUMNS, MAX_ROWS, escape_text, traces
+from tdacoustic.reporting.plotly_traces import MAX_COLUMNS, MAX_ROWS, escape_text, reads_out_together, traces
 
 __all__ = ["MAX_POINTS", "is_reduced", "render_plotly"]
 
@@ -72,6 +72,13 @@ def _axis(axis: Axis, limits: tuple[float, float], room: float, grid: bool) -> d
         names = [escape_text(name) for name in axis.names]
         layout |= {"tickmode": "array", "tickvals": list(range(len(names))), "ticktext": names}
     return layout
+
+
+def _read_out_place(axis: Axis) -> dict[str, Any]:
+    """The head of the box that reads out all lines, and the line that shows where."""
+    place = f"{escape_text(axis.label)}: %{{x:.6~r}} {escape_text(axis.unit_text)}".rstrip()
+    spike = {"spikecolor": "axis", "spikethickness": 1, "spikedash": "dot", "spikemode": "across"}
+    return {"unifiedhovertitle": {"text": place}, "showspikes": True, **spike}
 
 
 def _category_ticks(names: tuple[str, ...]) -> dict[str, Any]:
@@ -159,6 +166,10 @@ def _layout(figure: Figure) -> dict[str, Any]:
     traces = [element for element in figure.elements if isinstance(element, Line | Markers | Bars)]
     sizes = [element.values.size if isinstance(element, Bars) else element.x.size for element in traces]
     few = 1 < len(traces) <= 8 and max(sizes) <= 200 and bool(figure.categories)
+    lines = any(isinstance(element, Line) for element in figure.elements)
+    together = reads_out_together(figure)
+    if together:
+        x_axis |= _read_out_place(figure.x_axis)
     return {
         "height": figure.height,
         "autosize": True,
@@ -180,8 +191,9 @@ def _layout(figure: Figure) -> dict[str, Any]:
             "font": {"size": 12},
         },
         "separators": ".\u202f",
-        "hovermode": "x" if few else "closest",
-        "hoverdistance": 24,
+        "hovermode": "x unified" if together else "x" if few else "closest",
+        # lines alone: the nearest is read out wherever the pointer is
+        "hoverdistance": -1 if lines and not together and not heat and not figure.categories else 24,
         "hoverlabel": {
             "bgcolor": "paper",
             "bordercolor": "axis",
@@ -200,7 +212,7 @@ def _layout(figure: Figure) -> dict[str, Any]:
 
 _COLOUR_KEYS: Final = frozenset(
     {"color", "fillcolor", "gridcolor", "linecolor", "tickcolor", "bgcolor", "bordercolor", "arrowcolor"}
-    | {"paper_bgcolor", "plot_bgcolor"}
+    | {"paper_bgcolor", "plot_bgcolor", "spikecolor"}
 )
 
 

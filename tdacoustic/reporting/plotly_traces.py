@@ -14,11 +14,13 @@ import numpy as np
 from tdacoustic.reporting.decimate import FloatArray, block_max, drawn, envelope, minmax_indices
 from tdacoustic.reporting.figure import Band, Bars, Figure, Heatmap, Line, Markers
 
-__all__ = ["MAX_COLUMNS", "MAX_ROWS", "escape_text", "rounded", "traces"]
+__all__ = ["MAX_COLUMNS", "MAX_ROWS", "escape_text", "reads_out_together", "rounded", "traces"]
 
 MAX_COLUMNS: Final = 400
 MAX_ROWS: Final = 250
 """Cells of a map in the page."""
+MOST_READ_OUT: Final = 14
+"""Lines and markers of which all are read out at once: as many rows as stand beside each other in a usual figure."""
 
 _DASH: Final = {"solid": "solid", "dashed": "dash", "dotted": "dot", "steps": "solid"}
 _SYMBOL: Final = {
@@ -60,8 +62,29 @@ def _rounded_map(z: FloatArray) -> list[list[float | int | None]]:
     return [[v if v == v else None for v in row] for row in rows.tolist()]
 
 
-def _hover(figure: Figure, name: str, detail: bool = False) -> str:
+def reads_out_together(figure: Figure) -> bool:
+    """Whether all lines are read out at the pointer's place on the x axis: few enough lines, each once over x."""
+    lines = [element for element in figure.elements if isinstance(element, Line)]
+    held = [element for element in figure.elements if isinstance(element, Line | Markers)]
+    if not lines or len(held) > MOST_READ_OUT or figure.categories or figure.y_axis.names or figure.equal:
+        return False
+    if any(isinstance(element, Heatmap | Bars) for element in figure.elements):
+        return False
+    return all(bool(np.all(np.diff(line.x[np.isfinite(line.x)]) >= 0.0)) for line in lines)
+
+
+def _read_out(figure: Figure, name: str, detail: bool, own_place: bool) -> str:
+    """A row of the box that reads out all lines; what is not drawn at each x says its own."""
+    place = f"%{{x:.6~r}} {escape_text(figure.x_axis.unit_text)}".rstrip() + ", " if own_place else ""
+    value = f"{place}%{{y:.4~r}} {escape_text(figure.y_axis.unit_text)}".rstrip()
+    row = f"{escape_text(name)}: {value}" if name else value
+    return row + ("<br>%{hovertext}" if detail else "") + "<extra></extra>"
+
+
+def _hover(figure: Figure, name: str, detail: bool = False, own_place: bool = False) -> str:
     """Text under the pointer: name, then x and y with their units."""
+    if reads_out_together(figure):
+        return _read_out(figure, name, detail, own_place)
     lines = [f"<b>{escape_text(name)}</b>"] if name else []
     if figure.categories:
         lines.append(
@@ -108,6 +131,9 @@ def _line(figure: Figure, element: Line, ink: str, seen: set[str], max_points: i
         trace["marker"] = {"color": ink, "size": 7, "line": {"width": 1, "color": "paper"}}
     if figure.categories:
         trace["customdata"] = _category_names(figure, element.x[kept])
+    if any(isinstance(one, Heatmap) for one in figure.elements):
+        del trace["hovertemplate"]  # the level of the map below is what is asked for; legend and labels name the line
+        trace["hoverinfo"] = "skip"
     return trace
 
 
@@ -157,7 +183,7 @@ def _markers(figure: Figure, element: Markers, ink: str) -> dict[str, Any]:
             "symbol": _SYMBOL[element.symbol],
             "line": {"width": 1.6 if thin else 1, "color": ink if thin else "paper"},
         },
-        "hovertemplate": _hover(figure, element.name, bool(element.texts)),
+        "hovertemplate": _hover(figure, element.name, bool(element.texts), own_place=True),
         "name": escape_text(element.name),
     }
     if element.texts:

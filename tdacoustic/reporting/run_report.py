@@ -12,9 +12,17 @@ from tdacoustic.reporting.predicted_report import PREDICTED_FOOTER, predicted_se
 from tdacoustic.reporting.sections.calibration import calibration_section
 from tdacoustic.reporting.sections.gear_answer import gear_overview
 from tdacoustic.reporting.sections.gear_method import method_sections
-from tdacoustic.reporting.sections.lineage import lineage_sections
+from tdacoustic.reporting.sections.lineage import FED_BY, behind_a_fit, lineage_sections, resting_on
 from tdacoustic.reporting.sections.method import method_of_measurement
-from tdacoustic.reporting.sections.provenance import assumptions_said, inputs_of, settings_of, steps_of, versions_of
+from tdacoustic.reporting.sections.provenance import (
+    assumptions_said,
+    inputs_of,
+    settings_in_force,
+    settings_of,
+    stated_by,
+    steps_of,
+    versions_of,
+)
 from tdacoustic.reporting.sections.run_answer import run_answer
 from tdacoustic.results import CampaignResult
 
@@ -73,12 +81,20 @@ def _parts(result: CampaignResult) -> list[Section]:
 
 
 def _lineage(result: CampaignResult, parts: Sequence[Section]) -> tuple[list[Block], dict[str, str]]:
-    """What stands behind each part; parts of the model without steps lead to the whole."""
+    """What stands behind each part; parts of the model without steps lead to the whole.
+
+    A model that was fitted to recordings rests on their levels, and so does what it predicts.
+    """
+    fit = behind_a_fit(result.calibration)
     of_model = {
-        "calibration": () if result.calibration is None else result.calibration.records,
-        "prediction": () if result.prediction is None else result.prediction.records,
+        "calibration": fit,
+        "prediction": () if result.prediction is None else (*fit, *result.prediction.records),
     }
-    behind, lineage = lineage_sections(parts, result.records, result.inputs, of_model)
+    if fit or result.prediction is not None:
+        of_model["summary"] = (*resting_on(result.records, FED_BY["summary"]), *of_model["prediction"], *fit)
+    of_model = {id_: tuple(dict(records).items()) for id_, records in of_model.items()}
+    beside = ("settings", "method", "versions")
+    behind, lineage = lineage_sections(parts, result.records, result.inputs, of_model, beside)
     return behind, {part.id: "provenance" for part in parts} | lineage
 
 
@@ -86,7 +102,7 @@ def _provenance(result: CampaignResult, behind: Sequence[Block]) -> Section:
     """Inputs, settings, assumptions, methods, steps and versions, of all parts together."""
     blocks: list[Block] = [
         *inputs_of(result.inputs),
-        settings_of(result.settings),
+        settings_of(settings_in_force(result.campaign, result.calibration), stated_by(result.campaign)),
         *method_of_measurement(result.analysis),
         Section("assumptions", say("Assumptions on the recordings"), [assumptions_said()]),
         *(method_sections(result.prediction) if result.prediction is not None else ()),

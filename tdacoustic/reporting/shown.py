@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Final
 
-from tdacoustic.reporting.document import Cell, Column, Link
+from tdacoustic.reporting.document import Cell, Column, Link, Shown
 from tdacoustic.reporting.language import mark, say
 
 __all__ = ["NOTICE_WORDS", "ORIGIN_SENTENCES", "ORIGIN_WORDS", "cell_text", "number_text", "range_text"]
@@ -89,7 +89,7 @@ def cell_text(column: Column, cell: Cell) -> str:
     """
     if cell is None:
         return "\u2013" if column.kind == "number" else ""
-    if isinstance(cell, Link):
+    if isinstance(cell, Link | Shown):
         return cell.text
     if isinstance(cell, bool):
         return say("yes") if cell else say("no")

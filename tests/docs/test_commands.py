@@ -25,7 +25,7 @@ def test_the_page_is_what_the_program_has(script):
 
 def test_every_command_and_table_is_described(script):
     commands = {command.name or command.callback.__name__ for command in script.app.registered_commands}
-    assert set(script.OUTPUTS) == commands
+    assert set(script.OUTPUTS) == commands == set(script.EXAMPLES)
     assert set(script.TABLES) == set(COLUMNS)
     assert {name for _, tables in script.OUTPUTS.values() for name in tables} == set(COLUMNS)
 

@@ -68,4 +68,8 @@ def test_the_report_speaks_the_language_of_its_translations(followed):
 def test_the_section_is_in_the_page(followed):
     page = (followed / "with-our-section.html").read_text(encoding="utf-8")
     assert 'id="our-limit"' in page and "Our own limit" in page
-    assert "verdict-bad" in page.split('id="our-limit"')[1]  # 80 dB beside a limit of 78 dB
+    ours = page.split('<section id="our-limit"')[1].split("<section")[0]
+    assert "verdict-bad" in ours  # 80 dB beside a limit of 78 dB
+    assert 'href="#from-levels"' in ours and page.count('<section id="from-levels"') == 1
+    assert "Our company" in page and '<html lang="de">' in page
+    assert page.index('<section id="our-limit"') < page.index('<section id="provenance"')

@@ -1,8 +1,12 @@
 """The figures of docs/limits.md are those of the recorded studies, and its pages name no study that is not there."""
 
+import csv
 import json
 
 from guides import DOCS, ROOT, section
+
+from tdacoustic.reporting.page_limits import PAGE_LIMITS
+from tdacoustic.workflows.listening import MOST_CONDITIONS, STEADY_S, SWEEP_S
 
 PAGE = DOCS / "limits.md"
 
@@ -84,3 +88,23 @@ def test_the_calibration():
     foreign = [case["parameters"] for name, case in cases.items() if name.endswith("model sigma fitted")]
     worst = min(one["covered95"]["k"] / one["covered95"]["n"] for case in foreign for one in case.values())
     assert f"in the worst row {worst:.2f} of the intervals hold" in text
+
+
+def verdicts(name):
+    with (ROOT / "reports" / "example" / name).open(encoding="utf-8", newline="") as stream:
+        return [row["verdict"] for row in csv.DictReader(stream)]
+
+
+def test_beside_the_paper():
+    features, numbers = verdicts("features.csv"), verdicts("references.csv")
+    kept = features.count("reproduced")
+    text = words("Beside the paper")
+    assert f"Of {len(features)} features {kept} are reproduced and {len(features) - kept} are not" in text
+    assert f"of {len(numbers)} numbers {numbers.count('reproduced')} lie within 1 dB" in text
+
+
+def test_the_report():
+    text = words("The report")
+    assert f"at most {PAGE_LIMITS.page_bytes / 1e6:g} MB" in text
+    assert f"beyond {PAGE_LIMITS.interactive} figures the zoom" in text
+    assert f"{MOST_CONDITIONS} conditions at most: {STEADY_S:g} s of a steady one, {SWEEP_S:g} s of a run-up" in text

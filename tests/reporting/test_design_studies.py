@@ -234,5 +234,5 @@ def test_steps_done_very_often_are_counted(result):
     (table,) = block.blocks
     assert block.summary == f"{MOST_OF_A_STEP + 31} steps"
     assert len(table.rows) == MOST_OF_A_STEP + 1
-    assert table.rows[-1][0] == "31 more, see manifest.json"
+    assert table.rows[-1][0] == "31 more of this step"
     assert math.isclose(len(steps_of(result)[0].blocks[0].rows), len(result.records))

@@ -2,6 +2,7 @@
 
 import json
 import re
+from types import SimpleNamespace
 
 import pytest
 from report_figures import spectrum
@@ -9,7 +10,14 @@ from report_figures import spectrum
 from tdacoustic.reporting import Document, Facts, FigureBlock, Paragraph, ReportError, Section
 from tdacoustic.reporting.document import Table, walk
 from tdacoustic.reporting.html import render_html
-from tdacoustic.reporting.sections.lineage import FED_BY, lineage_sections, resting_on, settings_words
+from tdacoustic.reporting.sections.lineage import (
+    FED_BY,
+    MOST_SIGNS,
+    behind_a_fit,
+    lineage_sections,
+    resting_on,
+    settings_words,
+)
 from tdacoustic.results import LogInput
 from tdacoustic.steps.record import Record
 
@@ -80,7 +88,52 @@ def test_settings_are_words():
     words = settings_words(json.dumps({"$type": "a:B", "fields": settings}))
     assert words == "channels mic_1, mic_1; band_hz none; fast yes; orders none"
     long = settings_words(json.dumps({"$type": "a:B", "fields": {f"key{i}": "x" * 30 for i in range(99)}}))
-    assert len(long) < 420 and long.endswith(" ...")
+    assert len(long) < MOST_SIGNS + 20 and long.endswith(" ...")
+
+
+def test_objects_are_told_field_by_field():
+    frames = {"$type": "a:Frames", "fields": {"overlap": 0.5, "band_hz": {"$tuple": [20.0, 500.0]}}}
+    settings = {"frames": frames, "sensors": {"$tuple": [{"$tuple": ["m1", "motor"]}]}, "table": {"$array": 3}}
+    words = settings_words(json.dumps({"$type": "a:B", "fields": settings}))
+    assert words == "frames (overlap 0.5, band_hz (20, 500)); sensors (m1, motor); table a table"
+    deep = {"$type": "a:One", "fields": {"two": {"$type": "a:Two", "fields": {"three": frames}}}}
+    assert settings_words(json.dumps({"$type": "a:B", "fields": {"one": deep}})) == "one (two (three Frames))"
+    fleet = settings_words(json.dumps({"$type": "a:B", "fields": {"fleet": "y" * 300}}))
+    assert fleet == "fleet a text of 300 characters"
+
+
+def test_what_runs_share_is_told_once_and_what_differs_beside_it():
+    chain = [(run, record("survey", run, {"overlap": 0.5, "speed": speed})) for run, speed in (("a", 1.0), ("b", 2.0))]
+    blocks, _ = lineage_sections([Section("measured", "Measured", [])], chain, [])
+    facts = [(fact.key, fact.value) for block in walk(blocks) if isinstance(block, Facts) for fact in block.pairs]
+    assert facts == [("Survey, a, b", "overlap 0.5"), ("Survey, a", "speed 1"), ("Survey, b", "speed 2")]
+
+
+def words_behind(records, inputs):
+    model = [Section("prediction", "Prediction", [])]
+    blocks, _ = lineage_sections(model, CHAIN, inputs, {"prediction": records}, ("settings",))
+    texts = [block.text for block in walk(blocks) if isinstance(block, Paragraph)]
+    assert texts[0] == "Not repeated below: what the campaign sets in “Settings”."
+    return texts[-1]
+
+
+def test_a_model_names_the_files_that_it_is_stated_in():
+    words = words_behind([("x", record("responses", "6 conditions"))], [*LOGS, TOML])
+    assert words == (
+        "Stated in campaign.toml (SHA-256 3333333333333333). No log was read for it. "
+        "Whole SHA-256 in the table of inputs."
+    )
+
+
+def test_a_model_that_was_fitted_to_recordings_rests_on_their_logs():
+    analysis = SimpleNamespace(records=CHAIN)
+    model = ("x", record("responses", "6 conditions"))
+    fit = behind_a_fit(SimpleNamespace(analysis=analysis, records=(model,)))
+    assert [key for key, _ in fit] == ["s1", "m1", "s2", "m2", "x"]
+    words = words_behind(fit, [*LOGS, TOML])
+    assert words.startswith("Read from one.h5 (SHA-256 1111111111111111) and two.h5")
+    assert "Stated in campaign.toml" in words and "No log" not in words
+    assert behind_a_fit(None) == () and behind_a_fit(SimpleNamespace(analysis=None, records=(model,))) == (model,)
 
 
 def test_the_page_links_figures_to_what_stands_behind_their_section():

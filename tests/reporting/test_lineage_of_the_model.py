@@ -45,3 +45,6 @@ def test_every_figure_of_a_calibration_leads_to_what_it_came_of(tmp_path):
     ids = {block.id for block in walk(document.sections) if isinstance(block, Section)}
     assert anchors(page) and set(anchors(page)) <= ids
     assert ("from-calibration" in ids) == bool(result.records)
+    (settings,) = [block for block in walk(document.sections) if isinstance(block, Table) and block.name == "settings"]
+    (freed,) = [row[1] for row in settings.rows if row[0] == "calibration.free"]
+    assert freed == ", ".join(parameter.key for parameter in result.calibration.parameters)

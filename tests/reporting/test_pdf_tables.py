@@ -112,3 +112,25 @@ def test_a_cell_that_is_longer_than_a_page_is_shortened_and_says_by_how_much(tex
     read = read_table(Table("long", "Long", columns, [(text, "b", *"cdefgh"), ("next", "b", *"cdefgh")]))
     assert tight(f"({len(text) - 600} more signs)") in read.tight and "next" in read.tight
     assert_within_margins(read)
+
+
+def test_what_is_left_out_is_said_before_the_table() -> None:
+    """After it, it could stand alone on a page."""
+    read = read_table(numbers(3, 500))
+    assert "The first" in read.texts[0] and "The first" not in "".join(read.texts[1:])
+
+
+def test_a_unit_keeps_the_number_of_its_reference() -> None:
+    columns = [Column(f"c{number}", "Level", "dB re 20 \u00b5Pa", digits=1, kind="number") for number in range(12)]
+    text = read_table(Table("levels", "Levels", columns, [[60.0] * 12])).pdfium_text()
+    assert text.replace("\u00a0", " ").count("20 \u00b5Pa") == 12
+
+
+def test_long_names_do_not_turn_the_page() -> None:
+    """The columns of numbers fit upright; names without a space are broken rather than set on a page across."""
+    columns = [Column("run", "Run"), Column("mic", "Microphone"), *numbers(5, 1).columns]
+    name = "Getriebegehaeuse" * 4
+    read = read_table(Table("named", "Named", columns, [[name, name, "row", *[1.0] * 5]]))
+    assert sizes(read) == [(595, 842)]
+    assert read.tight.count(name) == 2
+    assert_within_margins(read)

@@ -303,7 +303,7 @@ def test_every_parameter_of_the_gear_model_is_listed_with_its_standing(reference
     document = predicted_report(reference)
     rows = {row["parameter"]: row for row in table(document, "model-parameters")}
     assert rows["Face width"]["standing"] == "assumed"
-    assert rows["Normal module"]["origin"] == "paper, Table 3" and rows["Normal module"]["standing"] is None
+    assert rows["Normal module"]["origin"] == "paper, Table 3" and rows["Normal module"]["standing"] == "printed"
     assert rows["Teeth of pinion and wheel"]["value"] == "31 : 104"
     assert rows["Bearing stiffness of the wheel, x, y, z"]["value"] == "1.2e9, 1.2e9, 4e8 N/m"
     assert not any(name.startswith(("Power", "Resistance")) for name in rows)
@@ -451,7 +451,7 @@ def test_a_calibrated_constant_and_a_weighting_are_said():
     assert "Its absolute height cannot be held" not in said
     assert "dB(A)" in of_condition(document, "1")
     rows = {row["parameter"]: row for row in table(document, "model-parameters")}
-    assert rows["Masuda: constant C"]["value"] == "\u221210 ± 1.5 dB"
+    assert rows["Masuda: constant C"]["value"] == "\u221210 ± 1.5 dB (1 σ)"
 
 
 def test_names_of_conditions_keep_their_letters():

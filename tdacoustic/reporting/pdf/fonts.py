@@ -20,6 +20,7 @@ from reportlab.pdfbase.cidfonts import UnicodeCIDFont
 from reportlab.pdfbase.ttfonts import TTFont
 
 from tdacoustic.reporting.font_files import chinese_font, dejavu_folder
+from tdacoustic.reporting.pdf.bidi import visual
 
 __all__ = ["BOLD", "REGULAR", "Fonts", "plain", "prepared"]
 
@@ -57,6 +58,8 @@ class Fonts:
     def runs(self, text: str, bold: bool = False) -> list[tuple[str, str]]:
         """Return the parts of a text with the font of each; a sign that no font has becomes its code, ``[U+1F600]``.
 
+        They are in the order in which they are seen from the left.
+
         Parameters
         ----------
         text : str
@@ -66,7 +69,9 @@ class Fonts:
         found: list[tuple[str, str]] = []
         own = BOLD if bold else REGULAR
         known = _signs(own)
-        for sign in plain(text):
+        for sign in visual(plain(text)):
+            if "\ufb50" <= sign <= "\ufefc" and ord(sign) not in known:  # a form of a letter that the font lacks
+                sign = unicodedata.normalize("NFKC", sign)[0]
             if ord(sign) in known and unicodedata.category(sign) not in _NOT_DRAWN:
                 font, shown = own, sign
             elif self.chinese is not None and sign in self.chinese_signs:

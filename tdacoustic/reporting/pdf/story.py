@@ -280,8 +280,16 @@ class Story:
     def _table(self, block: Table, depth: int) -> None:
         marked = markup(block.caption, self._fonts) + self._origin(block.origin) + self._came_about()
         caption = self._caption("table", f"tab-{block.name}", marked, "above")
-        parts = laid_out(block, self._fonts, *self._widths)
         self._lead(caption)
+        if len(block.rows) > MOST_ROWS:
+            held = say(
+                "The first {shown} of {rows} rows; the HTML page has all and saves them as {file}.",
+                shown=MOST_ROWS,
+                rows=len(block.rows),
+                file=block.csv_name,
+            )
+            self._lead(Paragraph(markup(held, self._fonts), style("small")))
+        parts = laid_out(block, self._fonts, *self._widths)
         for part in parts:
             if part.columns is not None:
                 words = say(
@@ -292,14 +300,5 @@ class Story:
                 )
                 self._lead(Paragraph(markup(words, self._fonts), style("small")))
             self._put(part.flowable, part.start_height, part.across)
-        rows = len(block.rows)
-        if rows > MOST_ROWS:
-            held = say(
-                "The first {shown} of {rows} rows; the HTML page has all and saves them as {file}.",
-                shown=MOST_ROWS,
-                rows=rows,
-                file=block.csv_name,
-            )
-            self._put(Paragraph(markup(held, self._fonts), style("small")), 0.0, parts[-1].across)
-        elif not rows:
+        if not block.rows:
             self._put(Paragraph(markup(say("No rows."), self._fonts), style("small")), 0.0, parts[-1].across)

@@ -5,13 +5,16 @@ enough; broken over pages with their header, and shortened where they are long.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
+import numpy as np
 from reportlab.lib.colors import HexColor
 from reportlab.platypus import LongTable, Paragraph
 
+from tdacoustic.reporting.decimate import FloatArray
 from tdacoustic.reporting.document import Cell, Column, Link, Table
 from tdacoustic.reporting.language import say_count
 from tdacoustic.reporting.layout import cut_text
@@ -31,7 +34,12 @@ MOST_SIGNS: Final = 600
 _PADS: Final = (3.0, 1.8)
 """Points beside the text of a cell, in a table and in one of many columns."""
 _MANY_COLUMNS: Final = 10
-_WIDEST_WORD: Final = 130.0
+_WIDEST_WORD, _NARROW_WORD = 130.0, 80.0
+"""Points of a word that is not broken; of one where the table would not fit on an upright page otherwise."""
+_APART: Final = 3.0
+"""Points more before a text that follows a column of numbers: both end where they meet."""
+_FILLED: Final = 0.8
+"""Part of a line that words fill, where they go over several [assumed]."""
 _FEWEST_LINES, _MOST_LINES = 1e-3, 1e6
 
 
@@ -83,12 +91,16 @@ def laid_out(table: Table, fonts: Fonts, upright: float, across: float) -> list[
     """
     rows = table.rows[:MOST_ROWS]
     pad = _PADS[len(table.columns) >= _MANY_COLUMNS]
-    asked = [_Asked.of(column, [row[place] for row in rows], fonts, pad) for place, column in enumerate(table.columns)]
-    least = [one.least for one in asked]
-    if sum(least) <= upright:
-        return [_part(table, rows, range(len(least)), _widths(asked, upright), False, fonts, pad, whole=True)]
-    if sum(least) <= across:
-        return [_part(table, rows, range(len(least)), _widths(asked, across), True, fonts, pad, whole=True)]
+    pads = _left_pads(table.columns, pad)
+    asks = [
+        _Asked.of(column, [row[place] for row in rows], fonts, pads[place] + pad)
+        for place, column in enumerate(table.columns)
+    ]
+    for widest, room in ((_WIDEST_WORD, upright), (_NARROW_WORD, upright), (_WIDEST_WORD, across)):
+        asked = [replace(one, least=min(one.least, widest)) for one in asks]
+        least = [one.least for one in asked]
+        if sum(least) <= room:
+            return [_part(table, rows, range(len(least)), _widths(asked, room), room == across, fonts, pad, whole=True)]
     parts = []
     for places in _groups(least, across):
         widths = _widths([asked[i] for i in places], across)
@@ -98,25 +110,37 @@ def laid_out(table: Table, fonts: Fonts, upright: float, across: float) -> list[
 
 @dataclass(frozen=True)
 class _Asked:
-    """Widths that a column asks for, in points: that of its widest word, of its widest text, and of its mean text."""
+    """Widths that a column asks for, in points: of its widest word, of its widest text, of each of its texts."""
 
     least: float
     most: float
-    mean: float
+    each: FloatArray
 
     @classmethod
-    def of(cls, column: Column, cells: Sequence[Cell], fonts: Fonts, pad: float) -> _Asked:
+    def of(cls, column: Column, cells: Sequence[Cell], fonts: Fonts, pads: float) -> _Asked:
         texts = [_shortened(cell_text(column, cell)) for cell in cells]
-        words = {word for text in (*texts, column.unit) for word in text.split()}
+        words = {word for text in texts for word in text.split()} | set(_unbroken(column.unit).split(" "))
         heads = [fonts.width(word, CELL, bold=True) for word in column.title.split()]
         word = max((*heads, *(fonts.width(word, CELL) for word in _longest(words))), default=0.0)
         head = max(fonts.width(column.title, CELL, bold=True), fonts.width(column.unit, CELL))
         widest = max((fonts.width(text, CELL) for text in _longest(set(texts))), default=0.0)
-        longest = max((len(text) for text in texts), default=0)
-        part = sum(len(text) for text in texts) / (len(texts) * longest) if longest else 0.0
-        beside = 2 * pad + 1.0
+        lengths = np.array([len(text) for text in texts], dtype=np.float64)
+        each = lengths * (widest / max(lengths.max(initial=0.0), 1.0))
+        beside = pads + 1.0
         most = max(widest, min(head, 60.0), word)
-        return cls(min(word, _WIDEST_WORD) + beside, most + beside, widest * part + beside)
+        return cls(word + beside, most + beside, each + beside * (lengths > 0))
+
+    def usual(self) -> tuple[float, ...]:
+        """Widths of a usual text: the mean, that of texts which are not empty, the root mean square."""
+        filled = self.each[self.each > 0]
+        if not filled.size:
+            return (0.0, 0.0, 0.0)
+        return float(self.each.mean()), float(filled.mean()), math.sqrt(float(np.mean(self.each**2)))
+
+
+def _unbroken(unit: str) -> str:
+    """A unit whose reference stays on one line, as 20 \u00b5Pa."""
+    return re.sub(r"(?<=\d) ", "\u00a0", unit)
 
 
 def _longest(texts: set[str]) -> list[str]:
@@ -125,16 +149,29 @@ def _longest(texts: set[str]) -> list[str]:
 
 
 def _widths(asked: Sequence[_Asked], room: float) -> list[float]:
-    """Widths within the room: as asked where all fit, else so that each column's mean text takes as many lines.
+    """Widths within the room: as asked where all fit, else those of a few shares of it that make the lowest table.
 
-    No column is narrower than its widest word; the number of lines is found by halving.
+    No column is narrower than its widest word.
     """
-
-    def of(lines: float) -> list[float]:
-        return [min(max(one.least, one.mean / lines), one.most) for one in asked]
-
     if sum(one.most for one in asked) <= room:
         return [one.most for one in asked]
+    shares = [_shared(asked, usual, room) for usual in zip(*(one.usual() for one in asked), strict=True)]
+    return min(shares, key=lambda widths: _lines(asked, widths))
+
+
+def _lines(asked: Sequence[_Asked], widths: Sequence[float]) -> float:
+    """Lines of all rows, about: a line ends before its edge, as words are not broken."""
+    full = [one.each / width for one, width in zip(asked, widths, strict=True)]
+    rows = [np.where(part <= 1.0, 1.0, np.ceil(part / _FILLED)) for part in full]
+    return float(np.max(rows, axis=0).sum())
+
+
+def _shared(asked: Sequence[_Asked], usual: Sequence[float], room: float) -> list[float]:
+    """Widths that let the usual text of each column take as many lines; their number is found by halving."""
+
+    def of(lines: float) -> list[float]:
+        return [min(max(one.least, width / lines), one.most) for one, width in zip(asked, usual, strict=True)]
+
     few, many = _FEWEST_LINES, _MOST_LINES
     for _ in range(60):
         middle = math.sqrt(few * many)
@@ -164,21 +201,23 @@ def _part(
     whole: bool,
 ) -> Part:
     columns = [table.columns[place] for place in places]
+    lefts = [_left_pads(table.columns, pad)[place] for place in places]
+    rooms = [width - left - pad for width, left in zip(widths, lefts, strict=True)]
     head = [_head(column, fonts) for column in columns]
     body = [
-        [
-            _cell(column, row[place], width - 2 * pad, fonts)
-            for column, place, width in zip(columns, places, widths, strict=True)
-        ]
+        [_cell(column, row[place], room, fonts) for column, place, room in zip(columns, places, rooms, strict=True)]
         for row in rows
     ]
     made = LeftTable([head, *body], colWidths=list(widths), repeatRows=1, splitInRow=1, spaceAfter=8.0)
-    made.setStyle(_look(columns, pad))
-    start = sum(
-        max(_height(cell, width - 2 * pad) for cell, width in zip(line, widths, strict=True))
-        for line in (head, *body[:3])
-    )
+    made.setStyle(_look(columns, lefts, pad))
+    start = sum(max(_height(cell, room) for cell, room in zip(line, rooms, strict=True)) for line in (head, *body[:3]))
     return Part(made, across, start, None if whole else (places[1] + 1, places[-1] + 1))
+
+
+def _left_pads(columns: Sequence[Column], pad: float) -> list[float]:
+    """Points left of the text of each column."""
+    sides = [_align(column) for column in columns]
+    return [pad + _APART * (at > 0 and side == "left" and sides[at - 1] == "right") for at, side in enumerate(sides)]
 
 
 def _align(column: Column) -> str:
@@ -191,7 +230,7 @@ def _paragraph(marked: str, align: str) -> Paragraph:
 
 def _head(column: Column, fonts: Fonts) -> Paragraph:
     title, unit = (cut_text(text, _MOST_IN_HEAD) for text in (column.title, column.unit))
-    below = f"<br/>{muted(markup(unit, fonts))}" if unit else ""
+    below = f"<br/>{muted(markup(_unbroken(unit), fonts))}" if unit else ""
     return _paragraph(f"{markup(title, fonts, bold=True)}{below}", _align(column))
 
 
@@ -221,7 +260,7 @@ def _height(cell: Any, room: float) -> float:
     return float(cell.wrap(room, 10_000.0)[1]) + 2 * 1.8
 
 
-def _look(columns: Sequence[Column], pad: float) -> list[tuple[Any, ...]]:
+def _look(columns: Sequence[Column], lefts: Sequence[float], pad: float) -> list[tuple[Any, ...]]:
     line, head = HexColor(colour("grid")), HexColor(colour("axis"))
     look: list[tuple[Any, ...]] = [
         ("FONT", (0, 0), (-1, -1), REGULAR, CELL, 8.8),
@@ -230,11 +269,11 @@ def _look(columns: Sequence[Column], pad: float) -> list[tuple[Any, ...]]:
         ("VALIGN", (0, 1), (-1, -1), "TOP"),
         ("TOPPADDING", (0, 0), (-1, -1), 1.8),
         ("BOTTOMPADDING", (0, 0), (-1, -1), 1.8),
-        ("LEFTPADDING", (0, 0), (-1, -1), pad),
         ("RIGHTPADDING", (0, 0), (-1, -1), pad),
         ("LINEABOVE", (0, 0), (-1, 0), 0.8, head),
         ("LINEBELOW", (0, 0), (-1, 0), 0.8, head),
         ("LINEBELOW", (0, 1), (-1, -1), 0.3, line),
     ]
+    look += [("LEFTPADDING", (i, 0), (i, -1), left) for i, left in enumerate(lefts)]
     look += [("ALIGN", (i, 0), (i, -1), _align(column).upper()) for i, column in enumerate(columns)]
     return look

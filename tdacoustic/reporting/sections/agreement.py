@@ -15,6 +15,8 @@ KIND_WORDS: Final = {"sensor": mark("sensors"), "order": mark("orders"), "contri
 """Kinds of evidence."""
 OPENINGS: Final = {"agree": mark("The kinds of evidence agree"), "disagree": mark("The kinds of evidence disagree")}
 ONE_ALONE: Final = mark("One kind of evidence alone")
+NOT_SURE: Final = mark("The kinds of evidence name different sources, and at most one of them is sure")
+"""Where the word is ``agree``, because no two that are sure contradict each other, but the sources differ."""
 
 
 def agreement_words(analysis: Analysis, condition: str) -> str:
@@ -43,4 +45,6 @@ def agreement_words(analysis: Analysis, condition: str) -> str:
     silent = [say(KIND_WORDS[kind]) for kind in found.agreement.silent if kind != "contribution"]
     said += [say("{kinds} name no source", kinds=joined(silent))] if silent else []
     said += [doubt] if doubt else []
-    return f"{say(OPENINGS.get(found.agreement.word, ONE_ALONE))}: {'; '.join(said)}."
+    differ = found.agreement.word == "agree" and len(by_source) > 1
+    opening = NOT_SURE if differ else OPENINGS.get(found.agreement.word, ONE_ALONE)
+    return f"{say(opening)}: {'; '.join(said)}."

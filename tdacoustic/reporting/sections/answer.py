@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pandas as pd
+
 from tdacoustic.attribution import Dominance, SourceLine
 from tdacoustic.attribution.dominance import DECIDED
 from tdacoustic.measured.levels import energy_mean_db
@@ -28,7 +30,7 @@ from tdacoustic.reporting.sections.words import (
 from tdacoustic.results import Analysis
 from tdacoustic.units import level_db
 
-__all__ = ["answer", "conditions_answer"]
+__all__ = ["answer", "conditions_answer", "level_of_condition"]
 
 NAMED_LINES = 3
 MOST_OF_THE_SOUND = 0.5
@@ -88,7 +90,7 @@ def _of_condition(analysis: Analysis, condition: str) -> str:
     if runs and all(run.measurement is not None and not run.measurement.steady for run in runs):
         orders = [loudest_order_words(analysis, run, receivers(analysis.runs)) for run in runs]
         known = dict.fromkeys(text for text in orders if text)
-        parts = [level, say("a run-up, so no noise lines and no dominant source"), *known]
+        parts = [level, say("the speed changes, so no noise lines and no dominant source"), *known]
         return _sentences_of(f"{words}: {'; '.join(parts)}.", agreement)
     verdict = next((v for v in analysis.dominance if v.condition == condition), None)
     held = [source for source in analysis.sources if source.line.condition == condition]
@@ -283,7 +285,14 @@ def _no_lines_words(analysis: Analysis, condition: str) -> str:
     return say("no noise lines but those that the campaign excludes") if excluded else say("no noise lines")
 
 
-def _level_words(analysis: Analysis, condition: str) -> str:
+def level_of_condition(analysis: Analysis, condition: str) -> str:
+    """Return the level of a condition, the energy mean over its receivers, with its reference; empty without one."""
+    value, _ = _level_of(analysis, condition)
+    return f"{value} re 20 µPa" if value else ""
+
+
+def _level_of(analysis: Analysis, condition: str) -> tuple[str, pd.DataFrame]:
+    """The level in words, and the rows that it is the mean of."""
     microphones = receivers(analysis.runs)
     table = analysis.tables["levels"]
     held = table[(table["condition"] == condition) & (table["quantity"] == "sound_pressure")]
@@ -298,6 +307,13 @@ def _level_words(analysis: Analysis, condition: str) -> str:
     elif weighted is not None:
         value = f"{weighted:.1f} dB(A)"
     else:
+        value = ""
+    return value, chosen
+
+
+def _level_words(analysis: Analysis, condition: str) -> str:
+    value, chosen = _level_of(analysis, condition)
+    if not value:
         return ""
     used = list(dict.fromkeys(chosen.loc[chosen["level_db"].notna() | chosen["laeq_db"].notna(), "channel"]))
     parts = [f"{value} re 20 µPa"]

@@ -74,7 +74,7 @@ def _value_words(parameter: FittedParameter, fleet: Fleet) -> str:
 def _of_parameter(parameter: FittedParameter, fleet: Fleet) -> str:
     values = {
         "parameter": keyed_words(parameter.key, fleet),
-        "quantity": quantity_of(parameter.key, parameter.value),
+        "quantity": quantity_of(parameter.key, parameter.value, parameter.stderr),
         "initial": parameter.initial,
     }
     if parameter.expression is not None:
@@ -95,7 +95,7 @@ def _interval_words(parameter: FittedParameter) -> str:
         return say(
             "its 95 % interval reaches from bound to bound, {low:g} to {high:g}", low=parameter.low, high=parameter.high
         )
-    low, high = (say("open") if end is None else f"{end:.4g}" for end in parameter.ci95)
+    low, high = (say("open") if end is None else f"{end:.3g}" for end in parameter.ci95)
     return say("95 % interval {low} to {high}", low=low, high=high)
 
 

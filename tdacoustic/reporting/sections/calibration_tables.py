@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Final
 
+from tdacoustic.fitting.calibrated import FittedParameter
 from tdacoustic.fitting.calibration import Calibration
 from tdacoustic.fitting.measured_level import MeasuredLevel
-from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.document import Cell, Column, Shown, Table
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.parameters import key_words
+from tdacoustic.reporting.sections.parameters import key_words, uncertain_words
 from tdacoustic.reporting.sections.sound_paths import heard_paths
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.results import CampaignCalibration
@@ -60,8 +61,21 @@ def parameters_table(found: Calibration) -> Table:
         bounds, before = (pretty_signs(text) for text in (say("{low:g} to {high:g}", low=p.low, high=p.high), before))
         unit = unit_of(p.key) if "." in p.key else ""
         words = key_words(p.key, found.fleet)
-        rows.append([words, unit, p.initial, p.value, p.stderr, low, high, bounds, before, p.key])
-    return Table("calibrated-parameters", say("Fitted parameters"), columns, rows, origin="calculated")
+        rows.append([words, unit, p.initial, *_with_error(p), low, high, bounds, before, p.key])
+    caption = say(
+        "Fitted parameters. ± is the standard error by linearisation at the fitted values; the interval is by profile "
+        "likelihood, which follows the curved model and need not lie evenly about the value."
+    )
+    return Table("calibrated-parameters", caption, columns, rows, origin="calculated")
+
+
+def _with_error(parameter: FittedParameter) -> tuple[Cell, Cell]:
+    """A fitted value and its standard error, rounded for reading to what the error allows; whole in the download."""
+    value, stderr = parameter.value, parameter.stderr
+    if stderr is None or not stderr > 0.0:
+        return value, stderr
+    shown, error = uncertain_words(value, stderr)
+    return Shown(shown, value), Shown(error, stderr)
 
 
 def levels_table(result: CampaignCalibration) -> Table:

@@ -9,7 +9,17 @@ from tdacoustic.attribution import CampaignContributions
 from tdacoustic.attribution.contribution_spans import NamedSpan
 from tdacoustic.attribution.contribution_step import paths_changed
 from tdacoustic.contributions import GroupPart, SpanContributions
-from tdacoustic.reporting.document import Block, Column, Details, FigureBlock, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.document import (
+    Block,
+    Column,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    Sentences,
+    Shown,
+    Table,
+)
 from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.coherence import coherence, state_speed, state_words
 from tdacoustic.reporting.sections.contribution_figures import (
@@ -40,8 +50,10 @@ METHOD = mark(
     "runs together; cross-talk between the sensors is taken off as far as the runs differ enough in the mix of their "
     "sources to tell it. Known: cross-talk leaves less than 3 dB open. Flagged: more, so the level is what the sensors "
     "explain, cross-talk included, and its range is that of the readings, no confidence interval. Refused: next to "
-    "nothing of it is its own; only the upper bound says something. Intervals are of 95 %. What is loud and has no "
-    "sensor is found under no component: it is what no sensor explains, or hides in those whose sensors feel it too; "
+    "nothing of it is its own; only the upper bound says something. Intervals are of 95 %. Parts and what no sensor "
+    "explains may add up to less than was recorded, for a run whose paths are not those of all runs together; the "
+    "interval of a known part reaches to where they would add up. What is loud and has no sensor is found under no "
+    "component: it is what no sensor explains, or hides in those whose sensors feel it too; "
     "where the paths differ from state to state it is not known, and contributions.csv holds an upper bound."
 )
 
@@ -244,7 +256,10 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
         Column("span", say("Sound")),
         Column("total_db", say("Measured"), "dB", 1, "number"),
         Column("residual_db", say("No sensor"), "dB", 1, "number"),
-        *(Column(f"{slug(component)}_db", begun_large(source_word(component)), "dB") for component in found.components),
+        *(
+            Column(f"{slug(component)}_db", begun_large(source_word(component)), "dB", kind="number", align="left")
+            for component in found.components
+        ),
     ]
     cells = [
         [
@@ -262,8 +277,17 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
     )
 
 
-def _cell(part: GroupPart) -> str:
+def _cell(part: GroupPart) -> Shown:
     """A part in the table: its level and range, or its bound, and its verdict where it is not known."""
+    words = _cell_words(part)
+    if part.verdict == "refused":
+        return Shown(words)
+    if part.verdict == "below":
+        return Shown(words, None, power_db(part.high))
+    return Shown(words, power_db(part.mean_square), power_db(part.high))
+
+
+def _cell_words(part: GroupPart) -> str:
     low, high = power_db(part.low), power_db(part.high)
     bound = "" if high is None else f"\N{LESS-THAN OR EQUAL TO} {high:.1f}"
     if part.verdict in ("refused", "below"):

@@ -11,13 +11,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Paragraph, Section, Table, walk
-from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.folding import few
 from tdacoustic.reporting.sections.words import joined
-from tdacoustic.results import LogInput
+from tdacoustic.results import CampaignCalibration, LogInput
 from tdacoustic.steps.record import Record
 
-__all__ = ["FED_BY", "lineage_sections", "resting_on", "settings_words"]
+__all__ = ["FED_BY", "behind_a_fit", "lineage_sections", "resting_on", "settings_words"]
 
 Records: TypeAlias = Sequence[tuple[str, Record]]
 
@@ -48,8 +48,24 @@ MOST_LABELS: Final = 6
 """Runs named one by one."""
 MOST_ITEMS: Final = 6
 """Items of a setting named one by one."""
-MOST_SIGNS: Final = 400
+MOST_SIGNS: Final = 600
 """Signs of the settings of a step."""
+LONG_TEXT: Final = 80
+"""Signs from which on a setting that is a text is told by its length."""
+DEEPEST: Final = 2
+"""Objects within objects that are told field by field; those further inside by their kind."""
+
+STATED: Final = ("campaign", "fleet", "TOML")
+"""Formats of the files that settings and parameters are stated in."""
+
+WHERE_THE_REST_IS: Final[Mapping[str, str]] = {
+    "settings": mark("what the campaign sets in “Settings”"),
+    "method": mark("windows, frames and averages in “What was done to the recordings”"),
+    "kinematics": mark("what turns how fast, and who says so, in “Speeds and mesh frequencies”"),
+    "model-parameters": mark("parameters of the model and their origins in “What the model rests on”"),
+    "versions": mark("versions of the software in “Versions”"),
+}
+"""What no subsection repeats, by the section's id."""
 
 
 def lineage_sections(
@@ -57,6 +73,7 @@ def lineage_sections(
     records: Records,
     inputs: Sequence[LogInput],
     of_model: Mapping[str, Records] | None = None,
+    beside: Iterable[str] = (),
 ) -> tuple[list[Block], dict[str, str]]:
     """Return a section with a subsection for each one that steps feed, and which section leads to which subsection.
 
@@ -69,7 +86,9 @@ def lineage_sections(
     inputs : sequence of LogInput
         Files that went in.
     of_model : mapping of str to sequence of (str, Record), optional
-        Records of sections of the model, by their id.
+        Records of sections of the model, by their id; these rest on the files of the campaign and the fleet too.
+    beside : sequence of str, optional
+        Ids of the sections on provenance that stand beside these.
 
     Returns
     -------
@@ -89,8 +108,14 @@ def lineage_sections(
     for id_, title in titles.items():
         if fed.get(id_):
             anchors[id_] = f"from-{id_}"
-            behind.append(_lineage(id_, title, fed[id_], files))
-    return [Section("behind", say("What stands behind each section"), behind)] if behind else [], anchors
+            stated = [file for file in inputs if file.format in STATED] if id_ in (of_model or {}) else []
+            behind.append(_lineage(id_, title, fed[id_], files, stated))
+    if not behind:
+        return [], anchors
+    there = {*titles, *beside}
+    rest = [say(words) for id_, words in WHERE_THE_REST_IS.items() if id_ in there]
+    opening = [Paragraph(say("Not repeated below: {places}.", places="; ".join(rest)))] if rest else []
+    return [Section("behind", say("What stands behind each section"), [*opening, *behind])], anchors
 
 
 def resting_on(records: Records, steps: Iterable[str]) -> Records:
@@ -115,6 +140,19 @@ def resting_on(records: Records, steps: Iterable[str]) -> Records:
     return tuple((key, record) for key, record in records if key in wanted)
 
 
+def behind_a_fit(found: CampaignCalibration | None) -> Records:
+    """Return the records that a fit rests on: those of the levels that were recorded, then the model's; none without.
+
+    Parameters
+    ----------
+    found : CampaignCalibration or None
+    """
+    if found is None:
+        return ()
+    recorded = () if found.analysis is None else resting_on(found.analysis.records, ("measurement",))
+    return (*recorded, *found.records)
+
+
 def settings_words(settings: str) -> str:
     """Return a record's settings as words; the names of channels and other objects stand for these.
 
@@ -128,15 +166,23 @@ def settings_words(settings: str) -> str:
     >>> settings_words('{"$type":"a:B","fields":{"overlap":0.5,"orders":{"$tuple":[1.0,31.0]},"mains_hz":null}}')
     'overlap 0.5; orders 1, 31; mains_hz none'
     """
-    tree = json.loads(settings)
-    fields = tree.get("fields") if isinstance(tree, dict) else None
-    if not isinstance(fields, dict):
-        return _shown(tree)
-    text = "; ".join(f"{key} {_shown(value)}" for key, value in fields.items())
+    return _short("; ".join(f"{key} {words}".strip() for key, words in _fields(settings).items()))
+
+
+def _short(text: str) -> str:
     return text if len(text) <= MOST_SIGNS else text[:MOST_SIGNS].rsplit(" ", 1)[0] + " ..."
 
 
-def _shown(value: Any) -> str:
+def _fields(settings: str) -> dict[str, str]:
+    """Settings in words, by their key; of settings that are no object the key is empty."""
+    tree = json.loads(settings)
+    fields = tree.get("fields") if isinstance(tree, dict) else None
+    if not isinstance(fields, dict):
+        return {"": _shown(tree)}
+    return {key: _shown(value) for key, value in fields.items()}
+
+
+def _shown(value: Any, depth: int = 0) -> str:
     if value is None:
         return say("none")
     if isinstance(value, bool):
@@ -144,29 +190,41 @@ def _shown(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, dict):
-        return _object_words(value)
+        return _object_words(value, depth)
     if isinstance(value, list):
-        return _items_words(value)
-    return str(value)
+        return _items_words(value, depth)
+    text = str(value)
+    return text if len(text) <= LONG_TEXT else say("a text of {count} characters", count=len(text))
 
 
-def _object_words(value: Mapping[str, Any]) -> str:
+def _object_words(value: Mapping[str, Any], depth: int) -> str:
     if "$tuple" in value:
-        return _items_words(value["$tuple"])
-    fields = value.get("fields", value)
-    if isinstance(fields, dict) and isinstance(fields.get("name"), str):
+        return _items_words(value["$tuple"], depth)
+    fields = value.get("fields")
+    if not isinstance(fields, dict):
+        return say("a table")
+    if isinstance(fields.get("name"), str):
         return str(fields["name"])
-    return str(value["$type"]).rsplit(":", 1)[-1] if "$type" in value else say("a table")
+    if depth >= DEEPEST:
+        return str(value.get("$type", "")).rsplit(":", 1)[-1]
+    return f"({', '.join(f'{key} {_inside(held, depth + 1)}' for key, held in fields.items())})"
 
 
-def _items_words(items: Sequence[Any]) -> str:
-    return few([_shown(item) for item in items], MOST_ITEMS) if items else say("none")
+def _items_words(items: Sequence[Any], depth: int) -> str:
+    return few([_inside(value, depth) for value in items], MOST_ITEMS) if items else say("none")
 
 
-def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInput]) -> Section:
+def _inside(value: Any, depth: int) -> str:
+    """A value within others: several in brackets."""
+    several = value["$tuple"] if isinstance(value, dict) and "$tuple" in value else value
+    return f"({_shown(value, depth)})" if isinstance(several, list) and several else _shown(value, depth)
+
+
+def _lineage(
+    id_: str, title: str, records: Records, files: Mapping[str, LogInput], stated: Sequence[LogInput]
+) -> Section:
     done = {key: record.title for key, record in records}
     alike: dict[tuple[str, str, str], list[str]] = {}
-    settings: dict[tuple[str, str], list[str]] = {}
     read: dict[str, None] = {}
     for _, record in records:
         keys = [key for _, key in record.inputs]
@@ -176,7 +234,6 @@ def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInpu
         )
         step = say("{step}, version {version}", step=record.step, version=record.version)
         alike.setdefault((record.title, step, ", ".join(made_from)), []).append(record.label)
-        settings.setdefault((record.title, settings_words(record.settings)), []).append(record.label)
     columns = (
         Column("title", say("Step")),
         Column("step", say("Name and version")),
@@ -190,14 +247,33 @@ def _lineage(id_: str, title: str, records: Records, files: Mapping[str, LogInpu
         columns,
         rows,
     )
-    told = [(f"{step}, {_labels(labels)}", words) for (step, words), labels in settings.items() if words]
+    told = _settings_told([record for _, record in records])
     folded = say_count("Settings of these steps, {count} entry", "Settings of these steps, {count} entries", len(told))
     blocks: list[Block] = [
-        _files_words([files[key] for key in read]),
+        _files_words([files[key] for key in read], stated),
         table,
         *([Details(folded, [Facts(told)])] if told else []),
     ]
     return Section(f"from-{id_}", say("Behind “{title}”", title=title), blocks)
+
+
+def _settings_told(records: Sequence[Record]) -> list[tuple[str, str]]:
+    """Settings step by step: what all of a step share, then where they differ."""
+    by_step: dict[str, list[tuple[str, dict[str, str]]]] = {}
+    for record in records:
+        by_step.setdefault(record.title, []).append((record.label, _fields(record.settings)))
+    told: list[tuple[str, str]] = []
+    for step, each in by_step.items():
+        first = each[0][1]
+        shared = {key: words for key, words in first.items() if all(held.get(key) == words for _, held in each)}
+        differing: dict[str, list[str]] = {}
+        for label, held in each:
+            own = "; ".join(f"{key} {words}".strip() for key, words in held.items() if key not in shared)
+            differing.setdefault(own, []).append(label)
+        common = "; ".join(f"{key} {words}".strip() for key, words in shared.items())
+        entries = [(common, [label for label, _ in each]), *differing.items()]
+        told += [(f"{step}, {_labels(labels)}", _short(words)) for words, labels in entries if words]
+    return told
 
 
 def _labels(labels: Sequence[str]) -> str:
@@ -205,9 +281,16 @@ def _labels(labels: Sequence[str]) -> str:
     return few(each, MOST_LABELS if len(each) <= MOST_LABELS else MOST_LABELS - 1)
 
 
-def _files_words(files: Sequence[LogInput]) -> Paragraph:
-    if not files:
-        return Paragraph(say("Computed from the campaign and the fleet without reading a log."))
+def _files_words(logs: Sequence[LogInput], stated: Sequence[LogInput]) -> Paragraph:
+    """What was read; `stated` are the files of the campaign and the fleet."""
+    whole = say("Whole SHA-256 in the table of inputs.")
+    told = [say("Read from {files}.", files=_named(logs))] if logs else []
+    told += [say("Stated in {files}.", files=_named(stated))] if stated else []
+    told += [] if logs else [say("No log was read for it.")]
+    return Paragraph(" ".join([*told, whole] if logs or stated else told))
+
+
+def _named(files: Sequence[LogInput]) -> str:
     named = [f"{file.written} (SHA-256 {file.sha256[:16]})" for file in files[:MOST_FILES]]
     named += [say("{count} more", count=len(files) - MOST_FILES)] if len(files) > MOST_FILES else []
-    return Paragraph(say("Read from {files}; whole SHA-256 in the table of inputs.", files=joined(named)))
+    return joined(named)

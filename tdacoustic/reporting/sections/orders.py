@@ -209,7 +209,7 @@ def _steady(analysis: Analysis, held: Sequence[tuple[MeasuredRun, RunOrders]], m
         "what does not repeat."
     )
     if rows:
-        table = Table("synchronous", caption, columns, rows)
+        table = Table("synchronous", caption, columns, rows, origin=analysis.campaign.origin)
         shown = [FigureBlock(average_figure(best[1].name, *best[2:]), analysis.campaign.origin)] if best else []
         words = say_count("{count} synchronous average", "{count} synchronous averages", len(rows))
         blocks.append(Details(words, [table, *shown]))

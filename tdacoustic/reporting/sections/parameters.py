@@ -2,16 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+import re
+from collections.abc import Callable, Mapping
+from typing import Final
 
 from tdacoustic.errors import FleetError
 from tdacoustic.fleet import Fleet
-from tdacoustic.reporting.document import Cell, Column, Table
+from tdacoustic.reporting.document import Cell, Column, Origin, Table
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import pretty_signs
 from tdacoustic.studies.words import number_words, unit_of
 
-__all__ = ["key_words", "keyed_words", "parameter_table", "quantity_of", "value_words"]
+__all__ = ["key_words", "keyed_words", "parameter_table", "quantity_of", "uncertain_words", "value_words"]
+
+STANDINGS: Final[Mapping[str, Origin]] = {
+    "assumed": "assumed",
+    "calibrated": "calculated",
+    "measured": "measured",
+    "paper": "printed",
+    "printed": "printed",
+    "synthetic": "synthetic",
+}
+"""What kind of value it is, by the first word of its origin."""
 
 
 def key_words(key: str, fleet: Fleet) -> str:
@@ -37,16 +50,49 @@ def keyed_words(key: str, fleet: Fleet) -> str:
     return key if words == key else f"{words} ({key})"
 
 
-def quantity_of(key: str, value: float) -> str:
-    """Return a value with the unit that its key names.
+def quantity_of(key: str, value: float, stderr: float | None = None) -> str:
+    """Return a value with the unit that its key names, and with its standard error where it has one.
 
     Examples
     --------
     >>> quantity_of("model.structure_gain_db", 5.0748), quantity_of("gear_dynamics.mesh_damping_ratio", 0.5)
     ('5.075 dB', '0.5')
+    >>> quantity_of("model.structure_gain_db", 4.8773, 11.83)
+    '4.9 ± 12 dB (1 σ)'
     """
     unit = unit_of(key) if "." in key else ""
-    return pretty_signs(f"{value:.4g}") + (unit if unit == "°" else f" {unit}".rstrip())
+    after = unit if unit == "°" else f" {unit}".rstrip()
+    if stderr is None or not stderr > 0.0:
+        return pretty_signs(f"{value:.4g}") + after
+    return f"{' ± '.join(uncertain_words(value, stderr))}{after} (1 σ)"
+
+
+def uncertain_words(value: float, stderr: float) -> tuple[str, str]:
+    """Return a value and its standard error: the error to two significant digits, the value as far, or to its own two.
+
+    Parameters
+    ----------
+    value : float
+    stderr : float
+        More than 0.
+
+    Examples
+    --------
+    >>> uncertain_words(4.877326, 11.83), uncertain_words(123.456, 0.0512), uncertain_words(-3.4e8, 2.12e7)
+    (('4.9', '12'), ('123.456', '0.051'), ('\N{MINUS SIGN}3.4e8', '2.1e7'))
+    """
+    of_error = math.floor(math.log10(float(f"{stderr:.1e}"))) - 1
+    of_value = math.floor(math.log10(abs(value))) - 1 if value else of_error
+    return _to_place(value, min(of_error, of_value)), _to_place(stderr, of_error)
+
+
+def _to_place(value: float, place: int) -> str:
+    """A number rounded to a power of ten, with an exponent where it is very large or very small."""
+    rounded = round(value, -place)
+    if rounded and not 1e-4 <= abs(rounded) < 1e6:
+        digits = max(1, math.floor(math.log10(abs(rounded))) - place + 1)
+        return _number(rounded, digits)
+    return pretty_signs(f"{rounded:.{max(0, -place)}f}")
 
 
 def parameter_table(name: str, caption: str, fleet: Fleet, named: Callable[[str], tuple[str, str] | None]) -> Table:
@@ -69,9 +115,10 @@ def parameter_table(name: str, caption: str, fleet: Fleet, named: Callable[[str]
         assumed = parameter.origin.startswith("assumed")
         origin = parameter.origin.removeprefix("assumed").lstrip(", ").capitalize() if assumed else parameter.origin
         value = value_words(parameter.key, parameter.value)
+        quantity = f"{value} {unit}".rstrip()
         if parameter.stderr is not None:
-            value += f" ± {parameter.stderr:.2g}"
-        rows.append([words, f"{value} {unit}".rstrip(), "assumed" if assumed else None, origin])
+            quantity = f"{f'{_with_error(value, parameter.value, parameter.stderr)} {unit}'.rstrip()} (1 σ)"
+        rows.append([words, quantity, _standing(parameter.origin), origin])
     columns = (
         Column("parameter", say("Parameter")),
         Column("value", say("Value")),
@@ -79,6 +126,18 @@ def parameter_table(name: str, caption: str, fleet: Fleet, named: Callable[[str]
         Column("origin", say("Where it comes from")),
     )
     return Table(name, caption, columns, rows)
+
+
+def _with_error(words: str, value: object, stderr: float) -> str:
+    """A value, in words already, and its standard error; a number is rounded to what the error allows."""
+    if isinstance(value, int | float) and stderr > 0.0:
+        return " ± ".join(uncertain_words(value, stderr))
+    return f"{words} ± {stderr:.2g}"
+
+
+def _standing(origin: str) -> Origin | None:
+    """What kind of value an origin in words says that it is, by its first word; None where that says nothing."""
+    return STANDINGS.get(re.split(r"[\s,:;]", origin, maxsplit=1)[0].lower())
 
 
 def value_words(key: str, value: object) -> str:

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
+from tdacoustic.campaign import Campaign
 from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
 from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.method import method_of_measurement
-from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
+from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
 
-__all__ = ["ASSUMPTIONS", "assumptions_said", "inputs_of", "provenance", "settings_of", "steps_of", "versions_of"]
+__all__ = [
+    "ASSUMPTIONS",
+    "assumptions_said",
+    "inputs_of",
+    "provenance",
+    "settings_in_force",
+    "settings_of",
+    "stated_by",
+    "steps_of",
+    "versions_of",
+]
 
 MOST_OF_A_STEP: Final = 200
 """Rows of one step in the page."""
@@ -34,7 +45,7 @@ def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
     """Return the section on provenance; `behind` are its subsections on single sections of the report."""
     blocks = [
         *inputs_of(analysis.inputs),
-        settings_of(analysis.settings),
+        settings_of(analysis.settings, stated_by(analysis.campaign)),
         *method_of_measurement(analysis),
         Section("assumptions", say("Assumptions"), [assumptions_said()]),
         *behind,
@@ -51,11 +62,41 @@ def inputs_of(files: Sequence[LogInput]) -> list[Block]:
     return [Table("inputs", say("Inputs"), columns, rows)] if rows else []
 
 
-def settings_of(settings: Mapping[str, object]) -> Section:
-    """Return the section on settings, by key."""
-    columns = (Column("setting", say("Setting")), Column("value", say("Value")))
-    rows = [(key, _shown(value)) for key, value in settings.items()]
+def settings_of(settings: Mapping[str, object], stated: Collection[str] = ()) -> Section:
+    """Return the section on settings, by key; those `stated` are told from defaults."""
+    columns = (
+        Column("setting", say("Setting")),
+        Column("value", say("Value")),
+        Column("stated", say("Set by")),
+    )
+    rows = [
+        (key, _shown(value), say("the campaign") if key in stated else say("default"))
+        for key, value in settings.items()
+    ]
     return Section("settings", say("Settings"), [Table("settings", say("Settings in force"), columns, rows)])
+
+
+def settings_in_force(campaign: Campaign, fit: CampaignCalibration | None) -> dict[str, object]:
+    """Return the settings of a campaign; of parameters to fit that its file does not name, those that the fit freed.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    fit : CampaignCalibration or None
+    """
+    settings: dict[str, object] = dict(campaign.settings)
+    if fit is not None and "free" not in campaign.calibration.model_fields_set:
+        own = {parameter.name for parameter in campaign.calibration.parameter}
+        settings["calibration.free"] = [found.key for found in fit.calibration.parameters if found.key not in own]
+    return settings
+
+
+def stated_by(campaign: Campaign) -> frozenset[str]:
+    """Return the keys of the settings that a campaign's file states, ``"analysis.overlap"``."""
+    tables = {"analysis": campaign.analysis, "calibration": campaign.calibration, "railway": campaign.railway}
+    return frozenset(
+        f"{name}.{key}" for name, table in tables.items() if table is not None for key in table.model_fields_set
+    )
 
 
 def versions_of(versions: Mapping[str, str]) -> Section:
@@ -65,7 +106,9 @@ def versions_of(versions: Mapping[str, str]) -> Section:
 
 def _shown(value: object) -> str:
     if value is None:
-        return say("default")
+        return say("not set")
+    if isinstance(value, bool):
+        return say("yes") if value else say("no")
     if isinstance(value, tuple | list):
         return ", ".join(_shown(item) for item in value) or say("none")
     if isinstance(value, Mapping):
@@ -83,11 +126,11 @@ def steps_of(result: Analysis | FleetPrediction | CampaignResult) -> list[Block]
     rows: list[tuple[str, str, str, int, str, str]] = []
     for key, record in result.records:
         named[record.step] += 1
-        made_from = ", ".join(v[:23] for _, v in record.inputs)
+        made_from = ", ".join(v[:23] if v.startswith("sha256:") else v[:16] for _, v in record.inputs)
         if named[record.step] <= MOST_OF_A_STEP:
             rows.append((record.label, record.title, record.step, record.version, key[:16], made_from))
         elif named[record.step] == often[record.step]:
-            more = say("{count} more, see manifest.json", count=often[record.step] - MOST_OF_A_STEP)
+            more = say("{count} more of this step", count=often[record.step] - MOST_OF_A_STEP)
             rows.append((more, record.title, record.step, record.version, "", ""))
     columns = (
         Column("label", say("Of")),

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 
+from tdacoustic.attribution import Dominance
 from tdacoustic.drive import GearState
 from tdacoustic.reporting.document import Block, Notice, Section, Sentences
 from tdacoustic.reporting.language import say, say_count
-from tdacoustic.reporting.sections.answer import conditions_answer
+from tdacoustic.reporting.sections.answer import conditions_answer, level_of_condition
 from tdacoustic.reporting.sections.calibration import calibration_answer
 from tdacoustic.reporting.sections.gear_answer import asked_lines
 from tdacoustic.reporting.sections.gear_words import (
@@ -24,8 +25,8 @@ from tdacoustic.reporting.sections.gear_words import (
 from tdacoustic.reporting.sections.parameters import key_words, quantity_of
 from tdacoustic.reporting.sections.sound_paths import SoundPath, heard_paths, is_added
 from tdacoustic.reporting.sections.verdicts import verdicts_answer
-from tdacoustic.reporting.sections.words import pretty_signs, source_word
-from tdacoustic.results import CampaignResult, FleetPrediction
+from tdacoustic.reporting.sections.words import condition_words, pretty_signs, probability_words, source_word
+from tdacoustic.results import Analysis, CampaignResult, FleetPrediction
 
 __all__ = ["calibration_line", "model_lines", "prediction_line", "run_answer"]
 
@@ -35,7 +36,7 @@ MOST_LEVELS = 8
 
 def run_answer(result: CampaignResult) -> list[Block]:
     """Return the summary: all in a few lines, then sources, fit and prediction with what speaks against them."""
-    lines = _dominance_line(result), calibration_line(result), prediction_line(result), *model_lines(result)
+    lines = *_dominance_lines(result), calibration_line(result), prediction_line(result), *model_lines(result)
     short = [line for line in lines if line]
     blocks: list[Block] = [Sentences(short)] if short else []
     blocks.append(Section("answer-sources", say("Which source dominates"), conditions_answer(result.analysis)))
@@ -60,10 +61,10 @@ def calibration_line(result: CampaignResult) -> str:
     found = result.calibration.calibration
     values = [
         say(
-            "{parameter} {initial:.4g} to {fitted}",
+            "{parameter} {fitted} (it was {initial:.4g})",
             parameter=key_words(p.key, found.fleet),
             initial=p.initial,
-            fitted=quantity_of(p.key, p.value),
+            fitted=quantity_of(p.key, p.value, p.stderr),
         )
         for p in found.parameters
     ]
@@ -91,6 +92,37 @@ def prediction_line(result: CampaignResult) -> str:
 def model_lines(result: CampaignResult) -> list[str]:
     """Return the lines of `asked_lines` of the prediction."""
     return [] if result.prediction is None else asked_lines(result.prediction)
+
+
+def _dominance_lines(result: CampaignResult) -> list[str]:
+    """Who dominates where, a sentence a condition, in order of speed; of many conditions one for all."""
+    analysis = result.analysis
+    verdicts = [verdict for verdict in analysis.dominance if verdict.shares]
+    if not 0 < len(verdicts) <= MOST_LEVELS:
+        return [line] if (line := _dominance_line(result)) else []
+    return [_verdict_line(analysis, verdict) for verdict in verdicts]
+
+
+def _verdict_line(analysis: Analysis, verdict: Dominance) -> str:
+    named = {
+        "condition": condition_words(analysis, verdict.condition),
+        "source": source_word(verdict.leading or verdict.dominant),
+        "probability": probability_words(verdict.confidence).replace(" ", "\u00a0"),
+        "percent": f"{100.0 * (verdict.line_fraction or 0.0):.0f}",
+    }
+    if verdict.dominant == "undecided":
+        words = say(
+            "{condition}: undecided, the {source} leads the noise lines (P\u00a0{probability}), which are {percent} % "
+            "of the sound energy",
+            **named,
+        )
+    else:
+        words = say(
+            "{condition}: the {source} dominates the noise lines (P\u00a0{probability}), which are {percent} % of the "
+            "sound energy",
+            **named,
+        )
+    return "; ".join(part for part in (words, level_of_condition(analysis, verdict.condition)) if part) + "."
 
 
 def _dominance_line(result: CampaignResult) -> str:
@@ -162,7 +194,7 @@ def _level_words(found: FleetPrediction) -> str:
         if len(levels) <= MOST_LEVELS
         else say("{lowest} to {highest}", lowest=levels[0], highest=levels[-1])
     )
-    return say("at {surface} {levels}", surface=found.prediction.surface, levels=shown)
+    return say("at {surface}, re 20 µPa, {levels}", surface=found.prediction.surface, levels=shown)
 
 
 def _louder_words(found: FleetPrediction) -> str:

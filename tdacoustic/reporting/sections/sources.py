@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 from tdacoustic.attribution import SourceLine
 from tdacoustic.measured.runs import receivers
-from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Sentences, Table
+from tdacoustic.reporting.document import Block, Cell, Column, Details, Paragraph, Section, Sentences, Shown, Table
 from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.gear_words import begun_large
 from tdacoustic.reporting.sections.words import (
@@ -78,7 +78,7 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
         Column("excitation", say("Excitation")),
         Column("source", say("Source"), kind="verdict"),
         *([Column("mark", say("Mark"), kind="verdict")] if marked else []),
-        Column("confidence", "P", align="right"),
+        Column("confidence", "P", kind="number"),
     ]
     rows = []
     for source in by_frequency(held):
@@ -94,7 +94,7 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
             "excitation": _excitation_words(source),
             "source": source.source,
             "mark": MARKS.get((source.conflict, is_override(source)), ""),
-            "confidence": say("set") if is_override(source) else probability_words(source.confidence),
+            "confidence": _probability_cell(source),
         }
         rows.append([cells[column.key] for column in columns])
     title = say("Noise lines, {condition}", condition=condition_words(analysis, condition))
@@ -102,6 +102,12 @@ def _table(analysis: Analysis, condition: str, held: Sequence[SourceLine]) -> Ta
     if verdict is not None and analysis.fleet is not None:
         title += f": {source_word(verdict)}"
     return Table(slug("sources", condition), title, columns, rows, origin=analysis.campaign.origin)
+
+
+def _probability_cell(source: SourceLine) -> Shown | None:
+    if is_override(source):
+        return Shown(say("set"))
+    return None if source.confidence is None else Shown(probability_words(source.confidence), source.confidence)
 
 
 def _evidence(held: Sequence[SourceLine]) -> Block:

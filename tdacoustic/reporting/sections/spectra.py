@@ -248,7 +248,7 @@ def _map_figure(run: MeasuredRun, channel: Channel, result: ChannelResult) -> Fi
     )
     return Figure(
         slug("map", run.name, channel.name),
-        say("Run-up, run {run}, {channel}: {speed}", run=run.name, channel=channel.name, speed=speed_words(run)),
+        say("Over time, run {run}, {channel}: {speed}", run=run.name, channel=channel.name, speed=speed_words(run)),
         say(
             "Density over time and frequency; each cell is the highest of the lines it covers. Lines that slope "
             "follow the speed, level ones stay at their frequency."
@@ -281,5 +281,5 @@ def _line_table(analysis: Analysis, run: MeasuredRun) -> Details | None:
     name = slug("lines", run.name)
     return Details(
         say_count("{count} line of run {run}", "{count} lines of run {run}", len(rows), run=run.name),
-        [Table(name, say("Lines of run {run}", run=run.name), columns, rows)],
+        [Table(name, say("Lines of run {run}", run=run.name), columns, rows, origin=analysis.campaign.origin)],
     )

@@ -6,7 +6,7 @@ import numpy as np
 
 from tdacoustic.attribution import Dominance
 from tdacoustic.attribution.dominance import DECIDED
-from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Table
+from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Shown, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.words import OWNER_SLOTS, probability_words, source_word
@@ -61,7 +61,7 @@ def _table(analysis: Analysis) -> Table:
         Column("condition", say("Condition")),
         Column("train_speed_km_h", say("Speed"), "km/h", digits, "number"),
         Column("dominant", say("Verdict"), kind="verdict"),
-        Column("confidence", "P", align="right"),
+        Column("confidence", "P", kind="number"),
         Column("motor_percent", say("Motor"), "%", 0, "number"),
         Column("gearbox_percent", say("Gearbox"), "%", 0, "number"),
         Column("ambiguous_percent", say("Either"), source_word("ambiguous"), 0, "number"),
@@ -97,9 +97,11 @@ def _table(analysis: Analysis) -> Table:
     )
 
 
-def _probability_cell(verdict: Dominance) -> str:
+def _probability_cell(verdict: Dominance) -> Shown | None:
     """The probability, and of what it is where that is not the verdict."""
+    if verdict.confidence is None:
+        return None
     words = probability_words(verdict.confidence)
     if verdict.dominant == "undecided" and verdict.leading is not None:
-        return f"{words} {source_word(verdict.leading)}"
-    return words
+        words = f"{words} {source_word(verdict.leading)}"
+    return Shown(words, verdict.confidence)

@@ -4,6 +4,8 @@
 
   /* ---- tables: sorting and download ---- */
   const value = (cell) => (cell.dataset.v !== undefined ? cell.dataset.v : cell.textContent.trim());
+  const sortable = (cell) => (cell.dataset.s !== undefined ? cell.dataset.s : value(cell));
+  const wording = (cell) => (cell.dataset.t !== undefined ? cell.dataset.t : cell.textContent.trim());
   const collator = new Intl.Collator("en", { numeric: true });
 
   const sortBy = (table, column, direction) => {
@@ -11,7 +13,7 @@
     const head = table.tHead.rows[0].cells[column];
     const numeric = head.dataset.kind === "number";
     const key = (row) => {
-      const text = value(row.cells[column]);
+      const text = sortable(row.cells[column]);
       return numeric ? (text === "" ? null : Number(text)) : text || null;
     };
     const rows = [...table.rowsAtFirst];
@@ -59,8 +61,12 @@
     const download = figure.querySelector(".csv");
     download.hidden = false;
     download.addEventListener("click", () => {
-      const lines = [all("thead th", table).map((cell) => cell.dataset.key)];
-      for (const row of table.tBodies[0].rows) lines.push([...row.cells].map(value));
+      // a number that is shown in words has both: the number under the column's key, the words in a column beside it
+      const heads = all("thead th", table), worded = heads.map((cell) => cell.dataset.worded !== undefined);
+      const lines = [heads.flatMap(({ dataset: { key } }, at) => (worded[at] ? [key, `${key}_text`] : [key]))];
+      for (const row of table.tBodies[0].rows) {
+        lines.push([...row.cells].flatMap((cell, at) => (worded[at] ? [value(cell), wording(cell)] : [value(cell)])));
+      }
       const text = lines.map((line) => line.map(quoted).join(",") + "\n").join("");
       save(new Blob([text], { type: "text/csv;charset=utf-8" }), download.dataset.file);
     });
@@ -166,6 +172,8 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const touch = matchMedia("(pointer: coarse)");
 
+  const AXES = ["xaxis", "yaxis"];
+
   let library = null;
   const plotly = () => {
     library = library || (async () => {
@@ -266,7 +274,7 @@
     const colours = palette[dark.matches ? "dark" : "light"];
     const labels = (figure.json.layout.meta || {}).labels || [];
     if (labels.length) change.annotations = annotations(labels, full.xaxis, full.yaxis, colours);
-    for (const name of ["xaxis", "yaxis"]) {
+    for (const name of AXES) {
       for (const [key, one] of Object.entries(ticks(full[name]))) change[`${name}.${key}`] = one;
     }
     if (!Object.keys(change).length) return;
@@ -279,18 +287,51 @@
     const { data, layout } = painted(figure, scheme);
     if (touch.matches) layout.dragmode = false;
     if (figure.live._fullLayout) {
-      for (const name of ["xaxis", "yaxis"]) layout[name].range = [...figure.live._fullLayout[name].range];
+      for (const name of AXES) layout[name].range = [...figure.live._fullLayout[name].range];
     }
     return { data, layout };
   };
 
   const config = { displayModeBar: false, displaylogo: false, doubleClick: "reset", showTips: false, responsive: false };
 
+  const reset = async (figure) => {
+    const { xaxis, yaxis } = figure.json.layout;
+    await (await plotly()).relayout(figure.live, { "xaxis.range": [...xaxis.range], "yaxis.range": [...yaxis.range] });
+  };
+
+  /* Keys of a figure: + and - zoom about its centre, arrows move by a tenth, 0 and Escape go back. */
+  const ZOOMS = { "+": 0.8, "=": 0.8, "-": 1.25, _: 1.25 };
+  const MOVES = { ArrowLeft: ["xaxis", -0.1], ArrowRight: ["xaxis", 0.1], ArrowDown: ["yaxis", -0.1], ArrowUp: ["yaxis", 0.1] };
+  const stretch = ([low, high], [first, last], zoom, shift) => {  // within the whole of the figure
+    const of = (v) => (v - first) / (last - first), back = (part) => first + part * (last - first);
+    const span = Math.min((of(high) - of(low)) * zoom, 1);
+    const start = Math.min(Math.max((of(low) + of(high) - span) / 2 + shift * span, 0), 1 - span);
+    return [back(start), back(start + span)];
+  };
+  const steer = async (figure, event) => {
+    if (event.ctrlKey || event.altKey || event.metaKey || event.target !== figure.live) return;
+    const zoom = ZOOMS[event.key], [moved, by] = MOVES[event.key] || [];
+    const back = event.key === "0" || event.key === "Escape";
+    if (!zoom && !moved && !back) return;
+    event.preventDefault();
+    if (back) { await reset(figure); return; }
+    const full = figure.live._fullLayout, change = {};
+    for (const name of AXES) {
+      if (moved && name !== moved) continue;
+      change[`${name}.range`] = stretch(full[name].range, figure.json.layout[name].range, zoom || 1, by || 0);
+    }
+    await (await plotly()).relayout(figure.live, change);
+  };
+
   const draw = async (figure) => {
     const Plotly = await plotly();
     figure.live = document.createElement("div");
     figure.live.className = "live-plot";
-    figure.live.setAttribute("aria-hidden", "true");
+    figure.live.setAttribute("role", "img");
+    figure.live.setAttribute("aria-label", figure.plot.querySelector("img").alt);
+    figure.live.setAttribute("aria-description", document.body.dataset.keys);
+    figure.live.tabIndex = 0;
+    figure.live.addEventListener("keydown", (event) => steer(figure, event));
     figure.plot.append(figure.live);
     figure.node.classList.add("live");
     const { data, layout } = layoutFor(figure, dark.matches ? "dark" : "light");
@@ -316,11 +357,11 @@
     const { data, layout } = layoutFor(figure, "light");
     const labels = (layout.meta || {}).labels || [];
     layout.annotations = annotations(labels, full.xaxis, full.yaxis, palette.light);
-    for (const name of ["xaxis", "yaxis"]) Object.assign(layout[name], ticks(full[name]));
+    for (const name of AXES) Object.assign(layout[name], ticks(full[name]));
     const origin = figure.node.dataset.origin ? ` (${figure.node.dataset.origin})` : "";
     const title = (figure.node.dataset.title + origin).replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
     layout.title = { text: title, x: 0.01, xanchor: "left", y: 1, yanchor: "top", yref: "container", pad: { t: 12 }, font: { size: 15 } };
-    layout.margin = { ...layout.margin, t: layout.margin.t + 34 };
+    layout.margin = { ...layout.margin, t: full._size.t + 34 };  // above a legend of any number of rows
     const size = { width: figure.live.clientWidth, height: layout.height + 34 };
     layout.height = size.height;
     layout.width = size.width;
@@ -342,10 +383,7 @@
     });
     const tools = node.querySelector(".tools");
     tools.hidden = false;
-    tools.querySelector(".reset").addEventListener("click", async () => {
-      const { xaxis, yaxis } = figure.json.layout;
-      (await plotly()).relayout(figure.live, { "xaxis.range": [...xaxis.range], "yaxis.range": [...yaxis.range] });
-    });
+    tools.querySelector(".reset").addEventListener("click", () => reset(figure));
     tools.querySelector(".png").addEventListener("click", () => picture(figure));
     figures.set(node, figure);
   }
