@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import platform
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -24,14 +25,51 @@ MOST_SAID = 30
 PROPERTY = "conformance"  # of a test's report, of what a worker returns, and of this plugin
 
 
-def record(item: pytest.Item, row: Row) -> None:
-    """Give a row of a running test to the reports of it."""
-    item.user_properties.append((PROPERTY, row.values()))
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--conformance", metavar="FILE", help="write this run's comparisons with outside truths as a page")
+    parser.addoption(
+        "--conformance-update",
+        action="store_true",
+        help="write tests/conformance.json and CONFORMANCE.md with the rows of the tests that ran",
+    )
 
 
-def plugin(config: pytest.Config) -> Collecting:
-    """Return the plugin of this process: one that judges, or a worker's."""
-    return Worker(config) if hasattr(config, "workerinput") else Conformance(config)
+def pytest_configure(config: pytest.Config) -> None:
+    """Register the plugin of this process: one that judges, or a worker's."""
+    worker = hasattr(config, "workerinput")
+    config.pluginmanager.register(Worker(config) if worker else Conformance(config), PROPERTY)
+
+
+@pytest.fixture
+def conformance(request: pytest.FixtureRequest) -> Callable[..., None]:
+    """Compare with an outside truth and record it: ``conformance(what, expected, got, tolerance, unit, source)``.
+
+    ``source`` is ``kind: where to look it up``, with a kind of ``conformance_rows.KINDS``. A wide tolerance has its
+    reason in ``note``. ``deviates=True`` states openly that the row does not hold, with the reason in ``note``: the
+    page shows it first, and the test fails as soon as it does hold.
+    """
+
+    def compare(
+        what: str,
+        expected: float,
+        got: float,
+        tolerance: float,
+        unit: str,
+        source: str,
+        note: str = "",
+        deviates: bool = False,
+    ) -> None:
+        row = Row(request.node.nodeid, what, float(expected), float(got), float(tolerance), unit, source, note)
+        assert unit, f"{what}: the unit is missing; of a plain number it is '1'"
+        assert note or not deviates, f"{what}: a deviation needs a note that says why"
+        assert note or not row.wide, f"{what}: ± {tolerance:.3g} {unit} is wide and needs a note that says why"
+        request.node.user_properties.append((PROPERTY, row.values()))  # travels in the reports of the test
+        if deviates:
+            assert not row.holds, f"{what}: stated as a deviation, but it holds: got {row.got:.9g}"
+            return
+        assert row.holds, f"{what}: expected {row.expected:.9g} ± {tolerance:.3g} {unit} ({source}), got {row.got:.9g}"
+
+    return compare
 
 
 class Collecting:

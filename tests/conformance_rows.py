@@ -21,13 +21,20 @@ KINDS = {
     "law": "a law of physics that any right answer keeps (energy, reciprocity)",
     "recording": "stated by a published recording or measured beside it",
 }
-COLUMNS = ("what", "expected", "got", "tolerance", "unit", "source")
-DIGITS = "digits"
+COLUMNS = ("what", "expected", "got", "tolerance", "unit", "source", "note")
+# Beyond these a tolerance says why: decibels, per cent, a share of what is expected, and of one where nothing is.
+WIDE_DB = 0.5
+WIDE_PERCENT = 2.0
+WIDE_PART = 0.1
+WIDE_OF_NOTHING = 0.01
 
 
 @dataclass(frozen=True)
 class Row:
-    """One comparison; ``source`` is ``kind: where to look it up``."""
+    """One comparison; ``source`` is ``kind: where to look it up``.
+
+    ``note`` says why the tolerance is wide, or, of a row that does not hold, why it need not.
+    """
 
     test: str
     what: str
@@ -36,6 +43,7 @@ class Row:
     tolerance: float
     unit: str
     source: str
+    note: str = ""
 
     def __post_init__(self) -> None:
         kind, _, reference = self.source.partition(": ")
@@ -45,8 +53,9 @@ class Row:
             raise ValueError(f"{self.what}: expected {self.expected} ± {self.tolerance} is no statement")
 
     def values(self) -> list[str | float]:
-        """Return what stands in ``COLUMNS``: ``Row(test, *values)`` is the row again."""
-        return [getattr(self, name) for name in COLUMNS]
+        """Return what stands in ``COLUMNS``, without an empty note: ``Row(test, *values)`` is the row again."""
+        values = [getattr(self, name) for name in COLUMNS]
+        return values if self.note else values[:-1]
 
     @property
     def kind(self) -> str:
@@ -66,6 +75,17 @@ class Row:
         away = abs(self.got - self.expected)
         return 0.0 if away == 0.0 else away / self.tolerance if self.tolerance else math.inf
 
+    @property
+    def wide(self) -> bool:
+        """Whether a wrong number could pass for a right one, so that the tolerance needs its reason."""
+        if self.unit.startswith("dB"):
+            return self.tolerance > WIDE_DB
+        if self.unit == "%":
+            return self.tolerance > WIDE_PERCENT
+        if self.expected:
+            return self.tolerance > WIDE_PART * abs(self.expected)
+        return (self.unit == "1" or self.unit.startswith("of ")) and self.tolerance > WIDE_OF_NOTHING
+
     def kept(self) -> Row:
         """Return the row as it is committed: no digit that the tolerance makes meaningless."""
         tolerance = float(f"{self.tolerance:.4g}")
@@ -78,6 +98,7 @@ class Row:
             tolerance,
             self.unit,
             self.source,
+            self.note,
         )
 
 
@@ -132,8 +153,7 @@ def differences(kept: Sequence[Row], recorded: Sequence[Row]) -> list[str]:
 
     What is expected, the tolerance, the unit and the source must be the committed ones (computed ones to 1e-6). What
     was got may differ by a quarter of the tolerance: another processor and another version of a library round
-    otherwise, and a number that moves further is another number. Of a number of right digits, which is made of what
-    rounding leaves, only the verdict counts.
+    otherwise, and a number that moves further is another number.
     """
     old, new = numbered(kept), numbered(recorded)
     said = [f"{_named(old[key])}: no longer recorded" for key in old if key not in new]
@@ -162,6 +182,8 @@ def _changes(old: Row, new: Row) -> list[str]:
     said = []
     if old.source != new.source:
         said.append(f"source is {new.source!r}, was {old.source!r}")
+    if old.note != new.note:
+        said.append(f"note is {new.note!r}, was {old.note!r}")
     if old.unit != new.unit:
         said.append(f"unit is {new.unit!r}, was {old.unit!r}")
     if abs(old.tolerance - new.tolerance) > 1e-3 * max(old.tolerance, new.tolerance):
@@ -170,6 +192,6 @@ def _changes(old: Row, new: Row) -> list[str]:
         said.append(f"expected is {new.expected:.9g}, was {old.expected:.9g}")
     if old.holds != new.holds:
         said.append(f"{'holds' if new.holds else 'does not hold'} now: got {new.got:.9g}, was {old.got:.9g}")
-    elif new.unit != DIGITS and abs(old.got - new.got) > max(0.25 * new.tolerance, 1e-9 * abs(new.got)):
+    elif abs(old.got - new.got) > max(0.25 * new.tolerance, 1e-9 * abs(new.got)):
         said.append(f"got {new.got:.9g}, was {old.got:.9g}")
     return said

@@ -14,8 +14,9 @@ from hypothesis import settings
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 sys.path.insert(0, str(Path(__file__).parent))  # for plain_fleets, made_up_modes, studies, conformance_*
 
-import conformance_plugin
-from conformance_rows import Row
+from conformance_plugin import conformance, pytest_addoption, pytest_configure
+
+__all__ = ["conformance", "pytest_addoption", "pytest_configure"]
 
 # The same examples in every run, so that a run tells of the change and not of the dice; HYPOTHESIS_PROFILE=search
 # looks for new ones.
@@ -24,34 +25,6 @@ settings.register_profile("search", max_examples=1000)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "same"))
 
 SHARED = Path(__file__).resolve().parents[2] / "shared"
-
-
-def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--conformance", metavar="FILE", help="write this run's comparisons with outside truths as a page")
-    parser.addoption(
-        "--conformance-update",
-        action="store_true",
-        help="write tests/conformance.json and CONFORMANCE.md with the rows of the tests that ran",
-    )
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    config.pluginmanager.register(conformance_plugin.plugin(config), conformance_plugin.PROPERTY)
-
-
-@pytest.fixture
-def conformance(request: pytest.FixtureRequest) -> Callable[..., None]:
-    """Compare with an outside truth and record it: ``conformance(what, expected, got, tolerance, unit, source)``.
-
-    ``source`` is ``kind: where to look it up``, with a kind of ``conformance_rows.KINDS``.
-    """
-
-    def compare(what: str, expected: float, got: float, tolerance: float, unit: str, source: str) -> None:
-        row = Row(request.node.nodeid, what, float(expected), float(got), float(tolerance), unit, source)
-        conformance_plugin.record(request.node, row)
-        assert row.holds, f"{what}: expected {row.expected:.9g} ± {tolerance:.3g} {unit} ({source}), got {row.got:.9g}"
-
-    return compare
 
 
 @pytest.fixture

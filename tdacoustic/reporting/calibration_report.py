@@ -7,9 +7,10 @@ from tdacoustic.reporting.document import Document, Notice, Section
 from tdacoustic.reporting.language import say
 from tdacoustic.reporting.sections.calibration import calibration_answer, calibration_section
 from tdacoustic.reporting.sections.lineage import behind_a_fit, lineage_sections
-from tdacoustic.reporting.sections.provenance import inputs_of, settings_in_force, settings_of, stated_by, versions_of
+from tdacoustic.reporting.sections.provenance import inputs_of, settings_of, stated_by, versions_of
 from tdacoustic.reporting.sections.what_if import what_if_section
 from tdacoustic.results import CampaignCalibration
+from tdacoustic.results.campaign_calibration import settings_in_force
 
 __all__ = ["calibration_report"]
 
@@ -39,7 +40,7 @@ def calibration_report(result: CampaignCalibration) -> Document:
             *inputs_of(result.inputs),
             settings_of(asked_of_fit, stated_by(campaign)),
             *behind,
-            versions_of(result.versions),
+            versions_of(result.versions, result.records),
         ],
     )
     asked = None if result.what_if is None else what_if_section(result.what_if, result.calibration.fleet)

@@ -233,8 +233,6 @@ class Table:
         At least one, with different keys.
     rows : sequence of sequences
         One cell a column: text, number, bool, `Link`, `Shown`, or None (also NaN) for not determined.
-    csv : str, optional
-        Name of the download; default ``<name>.csv``.
     origin : str, optional
         Of the numbers in it.
 
@@ -248,7 +246,6 @@ class Table:
     caption: str
     columns: Sequence[Column]
     rows: Sequence[Sequence[Cell]]
-    csv: str | None = None
     origin: Origin | None = None
 
     def __post_init__(self) -> None:
@@ -273,8 +270,8 @@ class Table:
 
     @property
     def csv_name(self) -> str:
-        """Name of the downloaded file."""
-        return self.csv or f"{self.name}.csv"
+        """Name of the downloaded file; no file beside a page has it, for those hold other rows and columns."""
+        return f"table-{self.name}.csv"
 
 
 def _plain(cell: object) -> Cell:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, Literal, TypeAlias
+from typing import Final, Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +27,7 @@ __all__ = [
     "Bars",
     "Element",
     "Figure",
+    "Hatch",
     "Heatmap",
     "Line",
     "Markers",
@@ -39,6 +40,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 LineStyle = Literal["solid", "dashed", "dotted", "steps"]
 Symbol = Literal["circle", "square", "diamond", "triangle", "cross", "x"]
 
+Hatch = Literal["/", "\\", "x", "-", "|", "+", "."]
+
+HATCHES: Final[tuple[str, ...]] = get_args(Hatch)
 LINE_STYLES: Final = ("solid", "dashed", "dotted", "steps")
 SYMBOLS: Final = ("circle", "square", "diamond", "triangle", "cross", "x")
 
@@ -288,6 +292,8 @@ class Bars:
         Half length of an error bar, or its lengths below and above.
     color : int, optional
         Slot of the palette; default: the next one.
+    hatch : Hatch, optional
+        Strokes or dots over the colour, so that bars differ without it too; default: none.
     """
 
     categories: Sequence[str]
@@ -295,6 +301,7 @@ class Bars:
     name: str
     errors: FloatArray | None = None
     color: int | None = None
+    hatch: Hatch | None = None
 
     def __post_init__(self) -> None:
         categories = tuple(str(category) for category in self.categories)
@@ -308,6 +315,8 @@ class Bars:
                 self, "errors", _values(f"errors of bars {self.name!r}", self.errors, of_sides, max(ndim, 1))
             )
         _slot(f"bars {self.name!r}", self.color)
+        if self.hatch is not None and self.hatch not in HATCHES:
+            raise ReportError(f"hatch of bars {self.name!r} must be None or one of {HATCHES}, got {self.hatch!r}")
 
 
 @dataclass(frozen=True, eq=False)

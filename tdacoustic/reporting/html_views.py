@@ -44,6 +44,8 @@ STATIC_DPI: Final = 150
 
 _SOURCES: Final = frozenset({"motor", "gearbox", "undecided", "mixed"})
 """Sources that have a look of their own."""
+_LOOKS: Final = ((40, "long"), (14, "some"))
+"""Signs from which on a text asks for a width, so that it is not broken into a word a line."""
 
 
 def safe_json(value: object) -> str:
@@ -69,6 +71,7 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align}
     view |= dict.fromkeys(("chip", "href", "order", "words"))
     view["text"] = text = cell_text(column, cell)
+    view["look"] = align if align != "left" else next((look for most, look in _LOOKS if len(text) > most), "")
     if cell is None:
         return view | {"raw": ""}
     if isinstance(cell, Link):

@@ -109,12 +109,20 @@ def _draw_bars(axes: Axes, figure: Figure, inks: dict[int, str]) -> None:
         heights = np.nan_to_num(bar.values)
         if figure.bar_mode == "stack":
             bottom = np.where(heights >= 0, above, below)
-            axes.bar(places, heights, whole, bottom, color=inks[index], label=bar.name, yerr=bar.errors, error_kw=error)
+            axes.bar(places, heights, whole, bottom, yerr=bar.errors, error_kw=error, **_look(bar, inks[index]))
             above, below = above + np.maximum(heights, 0), below + np.minimum(heights, 0)
             continue
         wide = whole / len(bars)
         at = places - whole / 2 + (number + 0.5) * wide
-        axes.bar(at, heights, wide * 0.94, color=inks[index], label=bar.name, yerr=bar.errors, error_kw=error)
+        axes.bar(at, heights, wide * 0.94, yerr=bar.errors, error_kw=error, **_look(bar, inks[index]))
+
+
+def _look(bar: Bars, ink: str) -> dict[str, Any]:
+    """Name, colour and strokes of bars; an edge without width gives the strokes their colour."""
+    look: dict[str, Any] = {"label": bar.name, "color": ink}
+    if bar.hatch is not None:
+        look |= {"hatch": 2 * bar.hatch, "edgecolor": colour("paper"), "linewidth": 0.0}
+    return look
 
 
 def _draw_heatmap(axes: Axes, figure: Figure, heat: Heatmap, coarse: bool) -> None:

@@ -211,7 +211,7 @@ def _layout(figure: Figure) -> dict[str, Any]:
 
 
 _COLOUR_KEYS: Final = frozenset(
-    {"color", "fillcolor", "gridcolor", "linecolor", "tickcolor", "bgcolor", "bordercolor", "arrowcolor"}
+    {"color", "fillcolor", "gridcolor", "linecolor", "tickcolor", "bgcolor", "fgcolor", "bordercolor", "arrowcolor"}
     | {"paper_bgcolor", "plot_bgcolor", "spikecolor"}
 )
 

@@ -73,10 +73,17 @@ def reads_out_together(figure: Figure) -> bool:
     return all(bool(np.all(np.diff(line.x[np.isfinite(line.x)]) >= 0.0)) for line in lines)
 
 
+def _is_of_strokes(line: Line) -> bool:
+    """Whether a line is upright strokes with gaps between them: stems, ranges."""
+    steps = np.diff(line.x)
+    steps = steps[np.isfinite(steps) & np.isfinite(line.y[1:] - line.y[:-1])]
+    return bool(steps.size and np.all(steps == 0.0))
+
+
 def _read_out(figure: Figure, name: str, detail: bool, own_place: bool) -> str:
     """A row of the box that reads out all lines; what is not drawn at each x says its own."""
     place = f"%{{x:.6~r}} {escape_text(figure.x_axis.unit_text)}".rstrip() + ", " if own_place else ""
-    value = f"{place}%{{y:.4~r}} {escape_text(figure.y_axis.unit_text)}".rstrip()
+    value = f"{place}%{{y:.4~r}} {escape_text(figure.y_axis.unit)}".rstrip()  # its reference stands at the axis
     row = f"{escape_text(name)}: {value}" if name else value
     return row + ("<br>%{hovertext}" if detail else "") + "<extra></extra>"
 
@@ -131,8 +138,10 @@ def _line(figure: Figure, element: Line, ink: str, seen: set[str], max_points: i
         trace["marker"] = {"color": ink, "size": 7, "line": {"width": 1, "color": "paper"}}
     if figure.categories:
         trace["customdata"] = _category_names(figure, element.x[kept])
-    if any(isinstance(one, Heatmap) for one in figure.elements):
-        del trace["hovertemplate"]  # the level of the map below is what is asked for; legend and labels name the line
+    over_a_map = any(isinstance(one, Heatmap) for one in figure.elements)
+    if over_a_map or (reads_out_together(figure) and _is_of_strokes(element)):
+        # asked for is the level of the map, or the points at the strokes' ends; legend and labels name the line
+        del trace["hovertemplate"]
         trace["hoverinfo"] = "skip"
     return trace
 
@@ -219,6 +228,9 @@ def _bars(figure: Figure, element: Bars, ink: str) -> dict[str, Any]:
         "hovertemplate": _hover(figure, element.name),
         "name": escape_text(element.name),
     }
+    if element.hatch is not None:
+        strokes = {"shape": element.hatch, "bgcolor": ink, "fgcolor": "paper", "size": 9, "solidity": 0.18}
+        trace["marker"]["pattern"] = strokes
     if element.errors is not None:
         trace["error_y"] = _error_bars(element.errors, "ink")
     return trace

@@ -17,7 +17,6 @@ from tdacoustic.reporting.sections.method import method_of_measurement
 from tdacoustic.reporting.sections.provenance import (
     assumptions_said,
     inputs_of,
-    settings_in_force,
     settings_of,
     stated_by,
     steps_of,
@@ -25,6 +24,7 @@ from tdacoustic.reporting.sections.provenance import (
 )
 from tdacoustic.reporting.sections.run_answer import run_answer
 from tdacoustic.results import CampaignResult
+from tdacoustic.results.campaign_calibration import settings_in_force
 
 __all__ = ["run_report"]
 
@@ -108,6 +108,6 @@ def _provenance(result: CampaignResult, behind: Sequence[Block]) -> Section:
         *(method_sections(result.prediction) if result.prediction is not None else ()),
         *behind,
         *steps_of(result),
-        versions_of(result.analysis.versions),
+        versions_of(result.analysis.versions, result.records),
     ]
     return Section("provenance", say("How the numbers came about"), blocks)

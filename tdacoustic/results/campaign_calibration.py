@@ -11,7 +11,7 @@ from tdacoustic.fleet import Fleet
 from tdacoustic.results.analysis import Analysis, LogInput
 from tdacoustic.steps.record import Record, versions
 
-__all__ = ["CampaignCalibration", "SpeedLevel"]
+__all__ = ["CampaignCalibration", "SpeedLevel", "settings_in_force"]
 
 
 @dataclass(frozen=True)
@@ -67,3 +67,19 @@ class CampaignCalibration:
     def versions(self) -> dict[str, str]:
         """Versions of Python and the libraries that made the numbers."""
         return dict(versions())
+
+
+def settings_in_force(campaign: Campaign, fit: CampaignCalibration | None) -> dict[str, object]:
+    """Return the settings of a campaign; of parameters to fit that its file does not name, those that the fit freed.
+
+    Parameters
+    ----------
+    campaign : Campaign
+    fit : CampaignCalibration or None
+    """
+    settings: dict[str, object] = dict(campaign.settings)
+    if fit is not None and "free" not in campaign.calibration.model_fields_set:
+        own = {parameter.name for parameter in campaign.calibration.parameter}
+        freed = (found.key for found in fit.calibration.parameters if found.key not in own)
+        settings["calibration.free"] = tuple(freed)
+    return settings

@@ -9,7 +9,7 @@ from pydantic import BaseModel
 
 from tdacoustic.campaign import Campaign
 from tdacoustic.results.analysis import Analysis, LogInput
-from tdacoustic.results.campaign_calibration import CampaignCalibration
+from tdacoustic.results.campaign_calibration import CampaignCalibration, settings_in_force
 from tdacoustic.results.fleet_prediction import FleetPrediction
 from tdacoustic.steps import Record
 
@@ -62,8 +62,8 @@ class CampaignResult:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """Every setting of ``[analysis]`` and ``[calibration]`` with its value, in the types that JSON has."""
-        return {key: _plain(value) for key, value in self.campaign.settings.items()}
+        """Every setting of ``[analysis]`` and ``[calibration]`` in force, in the types that JSON has."""
+        return {key: _plain(value) for key, value in settings_in_force(self.campaign, self.calibration).items()}
 
     @property
     def records(self) -> tuple[tuple[str, Record], ...]:

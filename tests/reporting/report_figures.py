@@ -30,7 +30,7 @@ def spectrum(name: str = "spectrum", word: str = "mic_1", n: int = 20_001) -> Fi
 def bars(name: str = "bars", bar_mode: str = "group") -> Figure:
     elements = (
         Bars(["1", "2", "3"], [80.0, np.nan, 90.0], "measured", errors=[1.0, 1.0, 1.0]),
-        Bars(["1", "2", "3"], [81.0, 85.0, 91.0], "predicted"),
+        Bars(["1", "2", "3"], [81.0, 85.0, 91.0], "predicted", hatch="/"),
         Markers([0, 1, 2], [79.0, 84.0, 88.0], "paper", symbol="diamond"),
         Line([0, 1, 2], [79.0, 84.0, 88.0], "trend", style="dotted"),
     )

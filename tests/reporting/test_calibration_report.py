@@ -11,7 +11,7 @@ from tdacoustic.reporting.calibration_report import calibration_report
 from tdacoustic.reporting.document import FigureBlock, Paragraph, Sentences, Table, walk
 from tdacoustic.reporting.html import render_html
 from tdacoustic.reporting.sections.calibration_figures import contributions_figure
-from tdacoustic.reporting.sections.calibration_tables import contributions_table
+from tdacoustic.reporting.sections.calibration_tables import contributions_table, parameters_table
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -90,6 +90,16 @@ def _log10(value):
     from math import log10
 
     return log10(value)
+
+
+def test_a_value_is_read_as_its_error_allows_and_downloaded_whole(printed):
+    (first, *_) = printed.calibration.parameters
+    parameter = dataclasses.replace(first, value=4.877326, stderr=11.83, ci95=(-10.1829, None))
+    found = parameters_table(dataclasses.replace(printed.calibration, parameters=(parameter,)))
+    (row,) = (dict(zip((column.key for column in found.columns), row, strict=True)) for row in found.rows)
+    assert (row["value"].text, row["stderr"].text, row["low"].text) == ("4.9", "12", "\u221210.2")
+    assert (row["value"].value, row["stderr"].value, row["low"].value) == (4.877326, 11.83, -10.1829)
+    assert row["high"] is None and "linearisation" in found.caption and "profile likelihood" in found.caption
 
 
 def test_what_is_printed_stands_beside_ours(blocks, printed):

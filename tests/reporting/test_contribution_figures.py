@@ -32,7 +32,7 @@ def figure(rows, modes):
     (made,) = over_speed(found, rows, "mic", modes)
     lines = [element for element in made.elements if isinstance(element, Line)]
     return made, {
-        name: [line for line in lines if line.name == name] for name in ("measured", "explained by no sensor")
+        name: [line for line in lines if line.name == name] for name in ("recorded", "explained by no sensor")
     }
 
 
@@ -40,14 +40,14 @@ def test_runs_of_different_conditions_share_no_line():
     rows = [row("up", 20.0, 80.0, False), row("down", 25.0, 70.0, False), row("up", 30.0, 80.0, False),
             row("down", 35.0, 70.0, False), row("a", 40.0, 75.0), row("b", 50.0, 76.0)]  # fmt: skip
     made, lines = figure(rows, {"a": "traction", "b": "traction"})
-    drawn = sorted((line.x.tolist(), np.round(line.y).tolist()) for line in lines["measured"])
+    drawn = sorted((line.x.tolist(), np.round(line.y).tolist()) for line in lines["recorded"])
     assert drawn == [([20.0, 30.0], [80.0, 80.0]), ([25.0, 35.0], [70.0, 70.0]), ([40.0, 50.0], [75.0, 76.0])]
     assert "Lines join the speeds of one run-up" in made.caption
 
 
 def test_steady_runs_of_two_modes_share_no_line():
     _, lines = figure([row("a", 40.0, 75.0), row("b", 50.0, 76.0)], {"a": "traction", "b": "coast"})
-    assert sorted(line.x.size for line in lines["measured"]) == [1, 1]
+    assert sorted(line.x.size for line in lines["recorded"]) == [1, 1]
 
 
 @pytest.mark.parametrize("reason", ["", REASON])

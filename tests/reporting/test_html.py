@@ -27,7 +27,7 @@ from tdacoustic.reporting import (
     Sentences,
     Table,
 )
-from tdacoustic.reporting.document import ORIGINS
+from tdacoustic.reporting.document import ORIGINS, Shown
 from tdacoustic.reporting.html import render_html
 from tdacoustic.reporting.html_views import safe_json
 from tdacoustic.reporting.page_limits import Held, PageLimits, left_out_words
@@ -151,6 +151,18 @@ def test_cells_show_one_thing_and_download_another(page: str) -> None:
     assert '<td data-v="true">yes</td>' in page
     assert '<td><span class="chip origin-measured">measured</span></td>' in page
     assert '<td><span class="chip verdict-bad">bad</span></td>' in page
+
+
+def test_a_number_in_words_is_sorted_and_saved_as_the_number() -> None:
+    columns = (Column("p", "P", kind="number"), Column("level_db", "Level", kind="number"))
+    rows = [(Shown("> 0.99", 0.9973), Shown("\u2264 61.2", order=61.2)), (Shown("=cmd()", np.nan), None)]
+    text = render_html(Document("R", "", "measured", summary=[Table("t", "T", columns, rows)]))
+    assert '<td class="right" data-v="0.9973">&gt; 0.99</td>' in text
+    assert '<td class="right" data-v="" data-s="61.2">\u2264 61.2</td>' in text  # a bound is no value
+    assert '<td class="right" data-v="" data-t="&#39;=cmd()">=cmd()</td>' in text
+    assert text.count("data-worded>") == 2
+    with pytest.raises(ReportError, match="column 'a' of table 't' is not of numbers"):
+        Table("t", "", [Column("a", "A")], [(Shown("> 0.99", 0.9973),)])
 
 
 def test_structure_is_semantic_and_anchors_are_unique(page: str) -> None:

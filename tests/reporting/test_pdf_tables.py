@@ -4,6 +4,7 @@ import pytest
 from read_pdf import ReadPdf, tight
 
 from tdacoustic.reporting import Column, Document, Facts, Paragraph, Section, Table
+from tdacoustic.reporting.document import Shown
 from tdacoustic.reporting.pdf import render_pdf
 
 A4 = (595, 842)
@@ -62,7 +63,7 @@ def test_a_long_table_has_its_header_on_each_page_and_says_what_is_left_out() ->
     assert len(held) >= 2
     assert all("Quantity-01" in text for text in held)
     assert "row-0119" in read.tight and "row-0120" not in read.tight
-    assert tight("The first 120 of 500 rows; the HTML page has all and saves them as wide.csv.") in read.tight
+    assert tight("The first 120 of 500 rows; the HTML page has all and saves them as table-wide.csv.") in read.tight
 
 
 def test_rows_that_are_all_printed_are_not_called_shortened() -> None:
@@ -124,6 +125,12 @@ def test_a_unit_keeps_the_number_of_its_reference() -> None:
     columns = [Column(f"c{number}", "Level", "dB re 20 \u00b5Pa", digits=1, kind="number") for number in range(12)]
     text = read_table(Table("levels", "Levels", columns, [[60.0] * 12])).pdfium_text()
     assert text.replace("\u00a0", " ").count("20 \u00b5Pa") == 12
+
+
+def test_a_number_in_words_is_printed_in_words() -> None:
+    columns = [Column("p", "P", digits=1, kind="number"), Column("level_db", "Level", "dB", digits=1, kind="number")]
+    text = read_table(Table("t", "T", columns, [[Shown("> 0.99", 0.9973), Shown("at most 61.2", order=61.2)]])).tight
+    assert tight("> 0.99") in text and tight("at most 61.2") in text and "1.0" not in text
 
 
 def test_long_names_do_not_turn_the_page() -> None:

@@ -451,7 +451,7 @@ def test_a_calibrated_constant_and_a_weighting_are_said():
     assert "Its absolute height cannot be held" not in said
     assert "dB(A)" in of_condition(document, "1")
     rows = {row["parameter"]: row for row in table(document, "model-parameters")}
-    assert rows["Masuda: constant C"]["value"] == "\u221210 ± 1.5 dB (1 σ)"
+    assert rows["Masuda: constant C"]["value"] == "\u221210.0 ± 1.5 dB (1 σ)"
 
 
 def test_names_of_conditions_keep_their_letters():

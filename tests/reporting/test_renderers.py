@@ -5,6 +5,7 @@ import os
 import struct
 import subprocess
 import sys
+from typing import Any
 
 import numpy as np
 import pytest
@@ -44,6 +45,17 @@ def test_pictures_are_the_same_twice(figure: Figure) -> None:
     svg = render_svg(figure)
     assert svg == render_svg(figure)
     assert "<dc:date>" not in svg
+
+
+def test_hatched_bars_have_their_strokes_in_both_renderers() -> None:
+    plain, hatched = (Bars(["1", "2"], [3.0, 4.0], "gearbox", hatch=hatch) for hatch in (None, "/"))
+    one, other = (Figure("b", "B", "", Axis("Run"), Axis("Share", "%"), [bars]) for bars in (plain, hatched))
+    assert "pattern" not in render_plotly(one)["data"][0]["marker"]
+    pattern = render_plotly(other, "light")["data"][0]["marker"]["pattern"]
+    assert pattern["shape"] == "/" and pattern["fgcolor"] == LIGHT["paper"] != pattern["bgcolor"]
+    assert "<pattern" not in render_svg(one) and "<pattern" in render_svg(other)
+    with pytest.raises(ReportError, match="hatch of bars 'gearbox'"):
+        Bars(["1"], [1.0], "gearbox", hatch="~")  # type: ignore[arg-type]
 
 
 def test_every_colour_of_the_page_is_a_role() -> None:
@@ -148,3 +160,21 @@ def test_many_long_categories_are_broken_into_lines() -> None:
     assert axis["ticktext"][3].replace("<br>", " ") == names[3] and "<br>" in axis["ticktext"][3]
     few = Figure("b", "B", "", Axis("Parameter"), Axis("Change", "dB"), [Bars(names[:2], np.ones(2), "one")])
     assert "tickangle" not in render_plotly(few)["layout"]["xaxis"]
+
+
+def test_lines_over_x_are_read_out_together_and_closed_ones_are_not() -> None:
+    x = np.linspace(0.0, 10.0, 50)
+    angle = np.linspace(0.0, 2.0 * np.pi, 50)
+
+    def drawn(*lines: Line) -> dict[str, Any]:
+        return render_plotly(Figure("f", "F", "", Axis("Frequency", "Hz"), Axis("Level", "dB"), lines))
+
+    together = drawn(
+        *(Line(x, x + n, f"c{n}") for n in range(11)), Line([2, 2, np.nan, 4, 4], [0, 1, np.nan, 0, 1], "s")
+    )
+    assert together["layout"]["hovermode"] == "x unified"
+    assert [trace.get("hoverinfo") for trace in together["data"]] == [None] * 11 + ["skip"]
+    assert drawn(Line(np.cos(angle), np.sin(angle), "c"))["layout"]["hovermode"] == "closest"
+    assert drawn(*(Line(x, x + n, f"c{n}") for n in range(40)))["layout"]["hovermode"] == "closest"
+    level = render_plotly(heatmap())
+    assert level["layout"]["hovermode"] == "closest" and level["layout"]["hoverdistance"] == 24

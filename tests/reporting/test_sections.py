@@ -1,22 +1,26 @@
 """What the sections of the report say of a small campaign whose sources are known."""
 
 import dataclasses
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
+import pandas as pd
 import pytest
 
-from tdacoustic.reporting.document import Details, FigureBlock, Notice, Section, Sentences, Table, walk
+from tdacoustic.reporting.document import Details, FigureBlock, Notice, Paragraph, Section, Sentences, Table, walk
 from tdacoustic.reporting.figure import Bars, Markers, Rule
 from tdacoustic.reporting.html import render_html
 from tdacoustic.reporting.language import Language, speaking
 from tdacoustic.reporting.measured_report import measured_report
 from tdacoustic.reporting.sections.answer import _rest_words, answer
 from tdacoustic.reporting.sections.kinematics import kinematics
+from tdacoustic.reporting.sections.levels import levels
 from tdacoustic.reporting.sections.side_by_side import side_by_side
 from tdacoustic.reporting.sections.sources import sources
+from tdacoustic.reporting.sections.spectra import spectra
 from tdacoustic.reporting.sections.words import joined, pretty_signs, probability_words
 from tdacoustic.workflows.analyze import analyze
 from tdacoustic.workflows.summary import summary_lines
@@ -212,6 +216,12 @@ def test_the_bars_fill_up_to_all_of_the_lines(judged):
     assert figure.categories == tuple(f"{name}: {verdict}" for name, verdict in verdicts.items())
 
 
+def test_bars_differ_without_their_colours(judged):
+    (figure,) = [block.figure for block in answer(judged) if isinstance(block, FigureBlock)]
+    hatches = [bar.hatch for bar in figure.elements if isinstance(bar, Bars)]
+    assert len(hatches) > 1 and len(set(hatches)) == len(hatches)
+
+
 def test_a_single_run_a_condition_is_said(plain):
     assert any("rests on a single run" in getattr(block, "text", "") for block in answer(plain))
 
@@ -243,7 +253,7 @@ def test_conflicts_and_overrides_are_marked(judged):
     fast = {round(row["frequency_hz"]): row for row in rows(held["sources-fast"])}
     assert slow[318]["mark"] == "conflict"
     assert (slow[318]["source"], slow[318]["excitation"]) == ("motor", "mesh x2")
-    assert (fast[900]["mark"], fast[900]["source"], fast[900]["confidence"]) == ("override", "gearbox", "set")
+    assert (fast[900]["mark"], fast[900]["source"], fast[900]["confidence"].text) == ("override", "gearbox", "set")
     assert any("seen on the bench" in words and "Without it: unassigned" in words for words in said(sources(judged)))
 
 
@@ -330,7 +340,39 @@ def test_assumed_and_given_parameters_are_told_apart(judged):
     assert held["Carrier of the inverter"]["standing"] == "assumed"
 
 
+# ---------------------------------------------------------------- levels and lines
+
+
+def test_what_a_level_is_uncertain_by_is_said(plain):
+    text = " ".join(block.text for block in levels(plain).blocks if isinstance(block, Paragraph))
+    assert "assumed to leave ± 0.3 dB (1 σ)" in text and "No condition was run twice" in text
+    (table,) = [block for block in levels(plain).blocks if isinstance(block, Table)]
+    assert "spread_db" not in [column.key for column in table.columns]
+
+
+def test_how_far_runs_of_a_condition_lie_apart_stands_in_the_table(plain):
+    frame = plain.tables["levels"]
+    again = frame.assign(run=frame["run"] + " again", level_db=frame["level_db"] + 1.5)
+    found = dataclasses.replace(plain, tables={**plain.tables, "levels": pd.concat([frame, again])})
+    (table,) = [block for block in levels(found).blocks if isinstance(block, Table)]
+    spreads = [row["spread_db"] for row in rows(table) if row["level_db"] is not None]
+    assert len(spreads) == 2 * len(frame) and spreads == pytest.approx([1.5] * len(spreads))
+
+
+def test_figures_of_several_channels_name_run_and_channels(judged):
+    titles = [figure.title for figure in figures(spectra(judged)) if figure.name.startswith("spectrum-")]
+    assert titles and not any(re.search(r"run \S+-\d+$", title) for title in titles)
+
+
 # ---------------------------------------------------------------- the whole report
+
+
+def test_no_table_of_recordings_lacks_its_origin_or_says_that_they_were_measured(judged):
+    document = measured_report(judged)
+    held = [b for b in walk(document.sections) if isinstance(b, Table) and b.name in ("quality", "quality-findings")]
+    assert held and all(table.origin == "synthetic" for table in held)
+    titles = [block.title for block in walk(document.sections) if isinstance(block, Section)]
+    assert "What was recorded" in titles and not any("measured" in title for title in titles)
 
 
 def test_the_report_begins_with_the_answer_and_folds_the_runs(judged):

@@ -57,8 +57,8 @@ def test_a_tacho_is_one_sentence_and_one_figure():
     made = analysis(run("a", profile()), run("b", profile(speed=np.full(T.size, 12.0))))
     section = speed(made)
     assert sentences(section) == [
-        "Tacho tacho tells the speed of the motor shaft in 2 runs, 601.5 to 1198 rpm; a value's standard error is "
-        "less than 0.01 %, by the scatter of its edges."
+        "The tacho “tacho” tells the speed of the motor shaft in 2 runs, 601.5 to 1198 rpm; a value's standard error "
+        "is less than 0.01 %, by the scatter of its edges."
     ]
     assert [line.name for line in figures(section)["speed-tacho"].elements] == ["run a", "run b"]
     assert {(row["run"], row["source"], row["unit"], row["known_share"]) for row in rows(made)} == {
@@ -177,7 +177,7 @@ def test_the_section_is_a_page():
 
 def test_a_shaft_that_stands_has_no_range_and_no_error():
     made = analysis(run("a", profile(speed=np.zeros(T.size))))
-    assert sentences(speed(made)) == ["Tacho tacho tells the speed of the motor shaft in run a, which stands."]
+    assert sentences(speed(made)) == ["The tacho “tacho” tells the speed of the motor shaft in run a, which stands."]
 
 
 def test_a_backward_speed_has_a_minus_sign():

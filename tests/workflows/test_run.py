@@ -72,7 +72,7 @@ def test_the_demonstration_has_all_its_files_and_the_contracts_hold(tda, tmp_pat
     lines = out.splitlines()
     assert [line.split(" (")[0] for line in lines[:5]] == [f"Condition {n}" for n in range(1, 6)]
     assert lines[5].startswith("Calibration: Masuda constant ") and " (it was 20)" in lines[5]
-    assert lines[6].startswith("Prediction with the calibrated fleet: at 4 m ")
+    assert lines[6].startswith("Prediction with the calibrated fleet: at 4 m (re 20 µPa) ")
     assert lines[7].startswith("What if (the model's level at 4 m): at 20 km/h 10 dB less from the motor takes ")
     assert "which are 6 to 16 % of the recorded sound energy: as long as the rest stays, the recorded" in lines[7]
     assert lines[8:] == [str(Path("out") / "report.html")]
@@ -95,6 +95,12 @@ def test_the_prediction_is_with_the_calibrated_fleet_where_the_campaign_was_and_
     for fitted in result.calibration.calibration.levels:
         (level,) = total[total["condition"] == fitted.datum.condition.name]["level_db"]
         assert level == pytest.approx(fitted.predicted_db, abs=0.05)
+
+
+def test_the_settings_name_the_parameters_that_were_fitted(demonstration):
+    fitted = {parameter.key for parameter in demonstration.calibration.calibration.parameters}
+    free = demonstration.settings["calibration.free"]
+    assert isinstance(free, list) and set(free) <= fitted and "model.structure_gain_db" in free
 
 
 def test_one_report_with_three_parts_and_one_provenance(demonstration):

@@ -8,7 +8,7 @@ import pytest
 from small_campaigns import HEAD, RATE_HZ, run_table, table, write_log
 
 from tdacoustic import analyze
-from tdacoustic.reporting.document import FigureBlock, Paragraph, Sentences, Table, walk
+from tdacoustic.reporting.document import FigureBlock, Paragraph, Sentences, Shown, Table, walk
 from tdacoustic.reporting.figure import Line, Markers
 from tdacoustic.reporting.sections.tones import tones
 from tdacoustic.workflows.output import OutputFolder
@@ -127,6 +127,22 @@ def test_the_rating_of_each_microphone(steady):
     assert frame.loc[("a", "left", ECMA), "notes"].startswith("it gives no mean audibility; prominent tones: 1 of 3")
     assert frame["speed_from"].isna().all()
     assert frame.notna()["notes"].all()
+
+
+def test_the_reports_table_has_a_dash_where_no_tone_is_audible(tmp_path):
+    logs = {"left": (sines(12.0, (800.0, 10.0)), "Pa"), "right": (noise(12.0, 3), "Pa")}
+    write_log(tmp_path / "a.h5", logs)
+    found = analysed(tmp_path, mic("left") + mic("right"), [run_table("a")], fleet=False)
+    loud = {rating.channel: rating.mean_audibility_db for rating in found.tonality.ratings if rating.method == ISO}
+    rated = next(b for b in walk([tones(found)]) if isinstance(b, Table) and b.name == "tonality")
+    keys = [column.key for column in rated.columns]
+    cells = {row[keys.index("channel")]: row[keys.index("mean_audibility_db")] for row in rated.rows}
+    for channel, mean in loud.items():
+        if mean == pytest.approx(-10.0):  # what ISO/TS 20065 sets for no audible tone
+            assert cells[channel] == Shown("\N{EN DASH}", mean) and "A dash in the audibility" in rated.caption
+        else:
+            assert cells[channel] == mean
+    assert loud["left"] > 0.0 and loud["right"] == pytest.approx(-10.0)
 
 
 def test_an_override_is_the_owner_of_the_tone_too(tmp_path):

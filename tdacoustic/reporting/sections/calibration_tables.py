@@ -56,7 +56,7 @@ def parameters_table(found: Calibration) -> Table:
     )
     rows: list[list[Cell]] = []
     for p in found.parameters:
-        low, high = (None, None) if p.ci95 is None else p.ci95
+        low, high = (None, None) if p.ci95 is None else map(_end, p.ci95)
         before = p.expression or (say("none") if p.prior is None else f"{p.prior[0]:.4g} ± {p.prior[1]:.3g}")
         bounds, before = (pretty_signs(text) for text in (say("{low:g} to {high:g}", low=p.low, high=p.high), before))
         unit = unit_of(p.key) if "." in p.key else ""
@@ -76,6 +76,11 @@ def _with_error(parameter: FittedParameter) -> tuple[Cell, Cell]:
         return value, stderr
     shown, error = uncertain_words(value, stderr)
     return Shown(shown, value), Shown(error, stderr)
+
+
+def _end(value: float | None) -> Cell:
+    """An end of an interval, three significant digits of it for reading."""
+    return None if value is None else Shown(pretty_signs(f"{value:.3g}"), value)
 
 
 def levels_table(result: CampaignCalibration) -> Table:

@@ -21,7 +21,13 @@ from tdacoustic.reporting.sections.campaigns_rows import (
     name_cell,
     shown_of,
 )
-from tdacoustic.reporting.sections.words import OWNER_SLOT_OTHER, OWNER_SLOTS, probability_words, source_word
+from tdacoustic.reporting.sections.words import (
+    OWNER_HATCHES,
+    OWNER_SLOT_OTHER,
+    OWNER_SLOTS,
+    probability_words,
+    source_word,
+)
 from tdacoustic.reporting.shown import ORIGIN_WORDS
 
 __all__ = ["MOST_BANDS", "campaigns_dominance", "matrix_width", "tally_words"]
@@ -133,6 +139,7 @@ def _figure(gathering: Gathering, origin: Origin, width: float) -> FigureBlock |
             np.array([float(held.get(word, 0)) for held in counts.values()]),
             source_word(word),
             color=OWNER_SLOTS.get(word, 7 if word == "undecided" else None),
+            hatch=OWNER_HATCHES.get(word),
         )
         for word in named
         if word not in others

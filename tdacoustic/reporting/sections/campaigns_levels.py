@@ -188,7 +188,7 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
         return [
             Paragraph(
                 say(
-                    "Levels over years, {origin}: no speed was measured in two years, so there is no figure.",
+                    "Levels over years, {origin}: no speed was recorded in two years, so there is no figure.",
                     origin=say(ORIGIN_WORDS[origin]),
                 )
             )
@@ -223,8 +223,8 @@ def _over_years(origin: Origin, points: Sequence[LevelPoint]) -> list[FigureBloc
     if rest:
         words.append(
             say_count(
-                "{count} more speed of a fleet was measured in several years.",
-                "{count} more speeds of a fleet were measured in several years.",
+                "{count} more speed of a fleet was recorded in several years.",
+                "{count} more speeds of a fleet were recorded in several years.",
                 rest,
             )
         )

@@ -30,7 +30,7 @@ FEW: Final = 12
 SYMBOLS: Final = {"ok": "circle", "flagged": "x", "refused": "triangle", "below": "triangle"}
 LEGENDS: Final = {"flagged": mark("{component}, flagged"), "bound": mark("{component}, at most")}
 RANGE: Final = mark("range")
-MEASURED: Final = mark("measured")
+RECORDED: Final = mark("recorded")
 NO_SENSOR: Final = mark("explained by no sensor")
 DRAWN: Final = mark(
     "A dot is known, a cross flagged, a triangle an upper bound of what is refused or does not stand above its "
@@ -75,14 +75,14 @@ def _slot(found: CampaignContributions, name: str) -> int:
     return OWNER_SLOTS[name] if name in OWNER_SLOTS else (OWNER_SLOT_OTHER, 4, 5, 6)[others.index(name) % 4]
 
 
-def _measured(x: Array, rows: Sequence[SpanContributions], traces: Sequence[str]) -> Iterator[Element]:
-    """What was measured and what no sensor explains, a line for each run or mode."""
+def _recorded(x: Array, rows: Sequence[SpanContributions], traces: Sequence[str]) -> Iterator[Element]:
+    """What was recorded and what no sensor explains, a line for each run or mode."""
     total = np.array([power_db(parts.total) for parts in rows], dtype=np.float64)
     rest = np.array([None if paths_changed(p) else power_db(p.residual) for p in rows], dtype=np.float64)
     points = len(rows) <= FEW
     for trace in dict.fromkeys(traces):
         own = np.array([other == trace for other in traces])
-        words = say(MEASURED)
+        words = say(RECORDED)
         yield Line(x[own], total[own], words, color=7, group=words, points=points)
         if np.isfinite(rest[own]).any():
             words = say(NO_SENSOR)
@@ -96,9 +96,9 @@ def _elements(
     logarithmic: bool,
     traces: Sequence[str] | None = None,
 ) -> list[Element]:
-    """Parts of some spans: what was measured, what no sensor explains, and each component by its verdict."""
+    """Parts of some spans: what was recorded, what no sensor explains, and each component by its verdict."""
     at = np.array(x)
-    elements: list[Element] = [*_measured(at, rows, traces or [""] * len(rows))]
+    elements: list[Element] = [*_recorded(at, rows, traces or [""] * len(rows))]
     names = found.components
     span = float(at.max() - at.min()) if at.size > 1 else 1.0
     for number, name in enumerate(names):

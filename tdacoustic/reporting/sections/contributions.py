@@ -14,6 +14,7 @@ from tdacoustic.reporting.document import (
     Column,
     Details,
     FigureBlock,
+    Origin,
     Paragraph,
     Section,
     Sentences,
@@ -113,13 +114,17 @@ def _of_receiver(
     )
     blocks.append(in_sight(table, say("Contributions at {receiver} as a table", receiver=receiver)))
     if single:
-        title = say("Contributions at {receiver}, tone by tone", receiver=receiver)
+        title = say(
+            "Contributions at {receiver}, tone by tone: each row is a band around the line or order that it names and "
+            "holds all that lies in the band, other lines too",
+            receiver=receiver,
+        )
         table = _table(analysis, found, single, slug("contributions-of-tones", receiver), title)
         folded = say_count(
             "Tone by tone and order by order, {count} row", "Tone by tone and order by order, {count} rows", len(single)
         )
         blocks.append(Details(folded, [table]))
-    return [*blocks, *_reasons(held, receiver)]
+    return [*blocks, *_reasons(held, receiver, origin)]
 
 
 # ---------------------------------------------------------------- words
@@ -254,7 +259,7 @@ def _table(analysis: Analysis, found: CampaignContributions, rows: Sequence[Row]
         Column("run", say("Run")),
         Column("speed", say("Speed"), align="right"),
         Column("span", say("Sound")),
-        Column("total_db", say("Measured"), "dB", 1, "number"),
+        Column("total_db", say("Recorded"), "dB", 1, "number"),
         Column("residual_db", say("No sensor"), "dB", 1, "number"),
         *(
             Column(f"{slug(component)}_db", begun_large(source_word(component)), "dB", kind="number", align="left")
@@ -304,7 +309,7 @@ def _span_words(span: NamedSpan) -> str:
     return say(SPAN_WORDS[span.kind]) if span.kind in SPAN_WORDS else span.span.name
 
 
-def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
+def _reasons(held: Sequence[Row], receiver: str, origin: Origin) -> list[Block]:
     """Why parts are flagged or refused, each reason once, with where."""
     where: dict[tuple[str, str, str], list[str]] = {}
     for state, span, parts in held:
@@ -333,7 +338,8 @@ def _reasons(held: Sequence[Row], receiver: str) -> list[Block]:
         )
         for (name, verdict, reason), places in where.items()
     ]
-    table = Table(slug("contribution-reasons", receiver), say("Why parts are flagged or refused"), columns, rows)
+    caption = say("Why parts are flagged or refused")
+    table = Table(slug("contribution-reasons", receiver), caption, columns, rows, origin=origin)
     folded = say_count(
         "Why parts are flagged or refused, {count} reason",
         "Why parts are flagged or refused, {count} reasons",

@@ -41,7 +41,7 @@ def gear_method(result: FleetPrediction) -> Section:
         *method_sections(result),
         Section("gear-input", say("Input"), inputs_of(result.inputs)),
         *steps_of(result),
-        versions_of(result.versions),
+        versions_of(result.versions, result.records),
     ]
     return Section("provenance", say("How the numbers came about"), blocks)
 

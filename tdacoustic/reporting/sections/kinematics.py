@@ -32,6 +32,8 @@ _EXCITATION_UNITS = {
     "supply": mark("times the supply frequency"),
     "shaft": mark("times the motor shaft's turns"),
 }
+RECORDED_SPEED = "the recorded speed"
+"""Of data that a program may have made, so not called measured."""
 
 
 def kinematics(analysis: Analysis) -> Section | None:
@@ -43,7 +45,7 @@ def kinematics(analysis: Analysis) -> Section | None:
     if held:
         text = say(
             "The calculated mesh frequency follows from the stated speed, the wheel diameter and the teeth (from the "
-            "measured speed where none is stated). The observed one is fitted to the lines of the gearbox's sensors; "
+            "recorded speed where none is stated). The observed one is fitted to the lines of the gearbox's sensors; "
             "± is one standard deviation, and the excess is observed over calculated, minus one. "
             "Slip between wheel and rail is not part of the calculation."
         )
@@ -69,7 +71,7 @@ def _table(analysis: Analysis, held: list[tuple[MeasuredRun, RunKinematics]]) ->
         Column("train_speed_km_h", say("Stated"), "km/h", 1, "number"),
         *([Column("wheel_diameter_mm", say("Wheel"), "mm", 1, "number")] if worn else []),
         Column("motor_calculated_rpm", say("Motor"), say("calculated, rpm"), 1, "number"),
-        Column("motor_measured_rpm", say("Motor"), say("measured, rpm"), 1, "number"),
+        Column("motor_measured_rpm", say("Motor"), say("recorded, rpm"), 1, "number"),
         Column("mesh_calculated_hz", say("Mesh"), say("calculated, Hz"), 1, "number"),
         Column("mesh_observed_hz", say("Mesh"), say("observed, Hz"), 1, "number"),
         Column("mesh_error_hz", "±", "1 σ, Hz", 2, "number"),
@@ -118,16 +120,16 @@ def _causes(run: MeasuredRun, found: RunKinematics) -> str:
 
 def _rivals(causes: str) -> str:
     """The causes as attribution names them; several are rivals, which the recordings alone do not tell apart."""
-    parts = pretty_signs(causes).split("; ")
+    parts = pretty_signs(causes).replace("the measured speed", RECORDED_SPEED).split("; ")
     if len(parts) == 1:
         return parts[0]
-    measured = [part for part in parts if part.startswith("the measured speed")]
+    recorded = [part for part in parts if part.startswith(RECORDED_SPEED)]
     ruled_out = [say("it is {cause}", cause=part) for part in parts if part.startswith("not ")]
-    rivals = [part for part in parts if not part.startswith(("the measured speed", "not "))]
+    rivals = [part for part in parts if not part.startswith((RECORDED_SPEED, "not "))]
     if rivals:
         causes = reduce(lambda one, other: say("{cause}, or {other}", cause=one, other=other), rivals)
-        measured.append(say("it may come from {causes}", causes=causes))
-    return "; ".join([*measured, *ruled_out])
+        recorded.append(say("it may come from {causes}", causes=causes))
+    return "; ".join([*recorded, *ruled_out])
 
 
 def _parameters(analysis: Analysis) -> Table:

@@ -31,14 +31,46 @@ def levels(analysis: Analysis) -> Section:
             say(
                 "The rms is of the whole record after its mean is removed; the level is that rms, corrected for "
                 "background where background runs exist, and so are the A-weighted level and that in the band, each "
-                "by its own; rms and third octaves are as measured. The A-weighted level applies the analytic curve "
+                "by its own; rms and third octaves are as recorded. The A-weighted level applies the analytic curve "
                 "of IEC 61672-1 to the spectrum. The level in the band leaves out what lies outside the band "
                 "given beside it."
             )
         )
     )
+    blocks.append(Paragraph(_uncertainty_words(analysis)))
     blocks += _bands(analysis)
     return Section("levels", say("Levels"), blocks)
+
+
+def _uncertainty_words(analysis: Analysis) -> str:
+    """How sure a level of sound pressure is: instruments, and runs of the same condition."""
+    stated = "level_sigma_db" in analysis.campaign.calibration.model_fields_set
+    values = {"sigma": analysis.campaign.calibration.level_sigma_db}
+    instruments = (
+        say(
+            "Instruments and their calibration leave ± {sigma:.2g} dB (1 σ) open in a sound pressure level, by "
+            "level_sigma_db in [calibration] of the campaign.",
+            **values,
+        )
+        if stated
+        else say(
+            "Instruments and their calibration are assumed to leave ± {sigma:.2g} dB (1 σ) open in a sound pressure "
+            "level; level_sigma_db in [calibration] of the campaign would state it.",
+            **values,
+        )
+    )
+    if not _spreads(analysis):
+        once = say("No condition was run twice, so how well its level repeats is not known.")
+        return f"{instruments} {once}"
+    runs = say("How far the runs of a condition lie apart at a channel stands in the table.")
+    return f"{instruments} {runs}"
+
+
+def _spreads(analysis: Analysis) -> dict[tuple[str, str], float]:
+    """Largest less smallest level by condition and channel, where there are several runs."""
+    table = analysis.tables["levels"]
+    held = table[table["level_db"].notna() & table["condition"].notna()].groupby(["condition", "channel"])["level_db"]
+    return {(str(c), str(n)): float(own.max() - own.min()) for (c, n), own in held if len(own) > 1}
 
 
 def _overview(analysis: Analysis) -> Figure | None:
@@ -77,6 +109,9 @@ def _table(analysis: Analysis) -> Table:
         Column("laeq_db", say("A-weighted"), "dB(A)", 1, "number"),
         Column("level_band_db", say("In the band"), "dB", 1, "number"),
     ]
+    spreads = _spreads(analysis)
+    if spreads:
+        columns.append(Column("spread_db", say("Runs apart"), "dB", 1, "number"))
     if len(bands) > 1:
         columns.append(Column("band", say("Band")))
     if (table["calibration"] == "doubtful").any():
@@ -86,7 +121,11 @@ def _table(analysis: Analysis) -> Table:
             Column("background_db", say("Background"), "dB", 1, "number"),
             Column("correction", say("Correction")),
         ]
-    rows = [[_cell(row, column) for column in columns] for row in table.to_dict("records")]
+    records = [
+        {**row, "spread_db": spreads.get((str(row["condition"]), str(row["channel"])))}
+        for row in table.to_dict("records")
+    ]
+    rows = [[_cell(row, column) for column in columns] for row in records]
     of = [say("sound pressure re 20 µPa, acceleration re 1 µm/s²")]
     of += [say("the band is {band}", band=band) for band in bands] if len(bands) == 1 else []
     return Table(

@@ -1,4 +1,4 @@
-"""What was measured: the campaign, its channels and its runs."""
+"""What was recorded: the campaign, its channels and its runs."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def measured(analysis: Analysis) -> Section:
         blocks.append(_channels(analysis))
     if analysis.campaign.levels:
         blocks.append(_known_levels(analysis))
-    return Section("measured", say("What was measured"), blocks)
+    return Section("measured", say("What was recorded"), blocks)
 
 
 def _runs(analysis: Analysis) -> Table:

@@ -161,7 +161,8 @@ def _fixed_table(analysis: Analysis, run: MeasuredRun) -> list[Block]:
         "line is there by itself at each class of speed. The width is an upper bound: the sweep broadens it.",
         run=run.name,
     )
-    return [in_sight(Table(name, caption, columns, _cells(held, columns)), say("What stays at its frequency"))]
+    found = Table(name, caption, columns, _cells(held, columns), origin=analysis.campaign.origin)
+    return [in_sight(found, say("What stays at its frequency"))]
 
 
 # ------------------------------------------------------------ steady runs
@@ -273,7 +274,8 @@ def _sidebands(analysis: Analysis) -> list[Block]:
     )
     rows = _cells(held, columns)
     name = say("Pairs of sidebands that stand 6 dB over the floor on both sides")
-    folded = Details(rows_words(say("Sidebands over speed"), len(rows)), [Table("sidebands", name, columns, rows)])
+    found = Table("sidebands", name, columns, rows, origin=analysis.campaign.origin)
+    folded = Details(rows_words(say("Sidebands over speed"), len(rows)), [found])
     return [Paragraph(_sideband_words(held)), folded]
 
 

@@ -7,17 +7,17 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Final
 
 from tdacoustic.campaign import Campaign
-from tdacoustic.reporting.document import Block, Column, Details, Facts, Section, Sentences, Table
+from tdacoustic.reporting.document import Block, Column, Details, Facts, Paragraph, Section, Sentences, Table
 from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.method import method_of_measurement
-from tdacoustic.results import Analysis, CampaignCalibration, CampaignResult, FleetPrediction, LogInput
+from tdacoustic.results import Analysis, CampaignResult, FleetPrediction, LogInput
+from tdacoustic.steps.record import Record
 
 __all__ = [
     "ASSUMPTIONS",
     "assumptions_said",
     "inputs_of",
     "provenance",
-    "settings_in_force",
     "settings_of",
     "stated_by",
     "steps_of",
@@ -50,7 +50,7 @@ def provenance(analysis: Analysis, behind: Sequence[Block] = ()) -> Section:
         Section("assumptions", say("Assumptions"), [assumptions_said()]),
         *behind,
         *steps_of(analysis),
-        versions_of(analysis.versions),
+        versions_of(analysis.versions, analysis.records),
     ]
     return Section("provenance", say("How the numbers came about"), blocks)
 
@@ -76,21 +76,6 @@ def settings_of(settings: Mapping[str, object], stated: Collection[str] = ()) ->
     return Section("settings", say("Settings"), [Table("settings", say("Settings in force"), columns, rows)])
 
 
-def settings_in_force(campaign: Campaign, fit: CampaignCalibration | None) -> dict[str, object]:
-    """Return the settings of a campaign; of parameters to fit that its file does not name, those that the fit freed.
-
-    Parameters
-    ----------
-    campaign : Campaign
-    fit : CampaignCalibration or None
-    """
-    settings: dict[str, object] = dict(campaign.settings)
-    if fit is not None and "free" not in campaign.calibration.model_fields_set:
-        own = {parameter.name for parameter in campaign.calibration.parameter}
-        settings["calibration.free"] = [found.key for found in fit.calibration.parameters if found.key not in own]
-    return settings
-
-
 def stated_by(campaign: Campaign) -> frozenset[str]:
     """Return the keys of the settings that a campaign's file states, ``"analysis.overlap"``."""
     tables = {"analysis": campaign.analysis, "calibration": campaign.calibration, "railway": campaign.railway}
@@ -99,9 +84,40 @@ def stated_by(campaign: Campaign) -> frozenset[str]:
     )
 
 
-def versions_of(versions: Mapping[str, str]) -> Section:
-    """Return the section on the versions of what made the numbers."""
-    return Section("versions", say("Versions"), [Facts(list(versions.items()))])
+def versions_of(versions: Mapping[str, str], records: Sequence[tuple[str, Record]] = ()) -> Section:
+    """Return the section on the versions of what made the numbers, and which steps were made with others.
+
+    Parameters
+    ----------
+    versions : mapping of str to str
+    records : sequence of (str, Record)
+        Key and record of the steps; one that the store has kept may come of an earlier version.
+    """
+    held = {name: Counter[str]() for name in versions}
+    for record in dict(records).values():
+        for name, version in record.libraries:
+            held.setdefault(name, Counter())[version] += 1
+    told = {name: _version_words(versions.get(name), found) for name, found in held.items()}
+    blocks: list[Block] = [Facts(list(told.items()))]
+    if told != dict(versions):
+        blocks.append(
+            Paragraph(
+                say("Some steps were computed earlier with other versions, and kept in the store; how many is said.")
+            )
+        )
+    return Section("versions", say("Versions"), blocks)
+
+
+def _version_words(version: str | None, found: Counter[str]) -> str:
+    """The version of a library; where steps were made with another one, each with the number of its steps."""
+    known = {*found, *([] if version is None else [version])}
+    if len(known) == 1:
+        return known.pop()
+    parts = [
+        say_count("{version} in {count} step", "{version} in {count} steps", count, version=other)
+        for other, count in found.most_common()
+    ]
+    return "; ".join(parts if version is None or version in found else [say("{version} now", version=version), *parts])
 
 
 def _shown(value: object) -> str:

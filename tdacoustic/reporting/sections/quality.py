@@ -27,6 +27,7 @@ def quality(analysis: Analysis) -> Section:
     )
     meaning = say("A channel with a bad check is not used. The limits of the checks are assumed, from practice.")
     blocks: list[Block] = [Paragraph(f"{count} {meaning}")]
+    origin = analysis.campaign.origin
     columns = (
         Column("run", say("Run")),
         Column("channel", say("Channel")),
@@ -35,8 +36,10 @@ def quality(analysis: Analysis) -> Section:
         Column("detail", say("Finding")),
     )
     if striking:
-        blocks.append(Table("quality-findings", say("What is doubtful or cannot be used"), columns, striking))
+        blocks.append(
+            Table("quality-findings", say("What is doubtful or cannot be used"), columns, striking, origin=origin)
+        )
     if rows:
-        table = Table("quality", say("All checks"), columns, rows)
+        table = Table("quality", say("All checks"), columns, rows, origin=origin)
         blocks.append(Details(say_count("{count} check", "All {count} checks", len(rows)), [table]))
     return Section("quality", say("Quality of the recordings"), blocks)

@@ -97,11 +97,11 @@ def _intro(found: RailwayMeasures) -> str:
     with_level = [item for item in found.quantities if item.quantity.level_db is not None]
     if not found.quantities:
         return say(
-            "Nothing is rated: no run that could be measured states its test with a microphone that can be used."
+            "Nothing is rated: no run that could be analysed states its test with a microphone that can be used."
         )
     words = say(
         "{count} of {all} quantities could be had from the runs ({standards}). "
-        "Levels are A-weighted, re 20 µPa, as measured; one that is corrected for background "
+        "Levels are A-weighted, re 20 µPa, as recorded; one that is corrected for background "
         "stands beside. A requirement that nothing in campaign and logs tells of is unknown, not "
         "met.",
         count=len(with_level),

@@ -194,7 +194,7 @@ def _level_words(found: FleetPrediction) -> str:
         if len(levels) <= MOST_LEVELS
         else say("{lowest} to {highest}", lowest=levels[0], highest=levels[-1])
     )
-    return say("at {surface}, re 20 µPa, {levels}", surface=found.prediction.surface, levels=shown)
+    return say("at {surface} (re 20 µPa) {levels}", surface=found.prediction.surface, levels=shown)
 
 
 def _louder_words(found: FleetPrediction) -> str:

@@ -19,7 +19,7 @@ from tdacoustic.reporting.document import (
 )
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.language import mark, say
-from tdacoustic.reporting.sections.parameters import value_words
+from tdacoustic.reporting.sections.parameters import quantity_of, value_words
 from tdacoustic.reporting.sections.words import joined, pretty_signs
 from tdacoustic.results import FleetPrediction
 from tdacoustic.studies import Sensitivity, Variation
@@ -148,10 +148,11 @@ def _table(result: FleetPrediction, found: Sensitivity) -> Table:
                 columns.append(Column(f"{over}_{case.name}", title, "dB", 2, "number"))
     columns.append(Column("parameter", say("Key")))
     order = sorted(range(len(found.varied)), key=lambda place: -abs(found.strongest("conditions")[place]))
+    errors = {parameter.key: parameter.stderr for parameter in result.fleet.parameters()}
     rows: list[list[Cell]] = []
     for place in order:
         variation = found.varied[place]
-        value = say("over speed") if variation.value is None else _value(variation)
+        value = say("over speed") if variation.value is None else _value(variation, errors.get(variation.key))
         changes = [float(change) for over in _OVER for change in found.of_total(over)[place]]
         cells: list[Cell] = [None if math.isnan(change) else change for change in changes]
         words = number_words(variation.key, result.fleet)
@@ -162,7 +163,9 @@ def _table(result: FleetPrediction, found: Sensitivity) -> Table:
     return Table("sensitivity-total", caption, columns, rows, origin="calculated")
 
 
-def _value(variation: Variation) -> str:
+def _value(variation: Variation, stderr: float | None) -> str:
+    if stderr is not None and isinstance(variation.value, int | float):
+        return quantity_of(variation.key, variation.value, stderr)
     unit = unit_of(variation.key)
     return value_words(variation.key, variation.value) + (unit if unit == "°" else f" {unit}".rstrip())
 

@@ -284,7 +284,7 @@ class _View:
         mesh = self.kinematics.mesh_hz
         if self.kinematics.motor_hz_stated is not None:
             return say("Mesh calculated from the stated speed: {frequency:.1f} Hz.", frequency=mesh)
-        return say("Mesh calculated from the measured speed: {frequency:.1f} Hz.", frequency=mesh)
+        return say("Mesh calculated from the recorded speed: {frequency:.1f} Hz.", frequency=mesh)
 
 
 def _markers(

@@ -164,12 +164,7 @@ def _spectrum_figure(
     spectrum = held[0][2]
     return Figure(
         slug("spectrum", run.name, quantity) + part,
-        say(
-            "{quantity}, {condition}, run {run}",
-            quantity=quantity_title(quantity),
-            condition=condition_words(analysis, run.run.condition or ""),
-            run=f"{run.name}{part}",
-        ),
+        _spectrum_title(analysis, run, quantity, [channel.name for channel, _, _ in held] if part else []),
         " ".join(
             [
                 say("Line spacing {spacing:.4g} Hz.", spacing=spectrum.resolution_hz),
@@ -182,6 +177,18 @@ def _spectrum_figure(
         elements,
         height=440,
     )
+
+
+def _spectrum_title(analysis: Analysis, run: MeasuredRun, quantity: str, channels: Sequence[str]) -> str:
+    """What a figure is of; its channels where the run needs several figures for them."""
+    values = {
+        "quantity": quantity_title(quantity),
+        "condition": condition_words(analysis, run.run.condition or ""),
+        "run": run.name,
+    }
+    if not channels:
+        return say("{quantity}, {condition}, run {run}", **values)
+    return say("{quantity}, {condition}, run {run}: {channels}", channels=", ".join(channels), **values)
 
 
 def _line_markers(

@@ -26,7 +26,7 @@ __all__ = [
 ]
 
 MOST_SENTENCES = MOST_FAULTS = 6
-_KINDS = {"tacho": mark("Tacho"), "channel": mark("Speed channel")}
+_KINDS = {"tacho": mark("The tacho"), "channel": mark("The speed channel")}
 
 Held = list[tuple[MeasuredRun, SpeedProfile]]
 
@@ -80,7 +80,7 @@ def _of_channel(teller: str, shaft: str, si_symbol: str, held: Held) -> str:
     kind, what, runs = say(_KINDS[source]), shaft_of(shaft, si_symbol), runs_words([run.name for run, _ in held])
     if low == high == 0.0:
         return say(
-            "{kind} {channel} tells the speed of {shaft} in {runs}, which stands.",
+            "{kind} “{channel}” tells the speed of {shaft} in {runs}, which stands.",
             kind=kind,
             channel=teller,
             shaft=what,
@@ -89,7 +89,7 @@ def _of_channel(teller: str, shaft: str, si_symbol: str, held: Held) -> str:
     speeds = pretty_signs(range_text(f"{low:.4g}", f"{high:.4g} {unit}"))
     clauses = [
         say(
-            "{kind} {channel} tells the speed of {shaft} in {runs}, {speeds}",
+            "{kind} “{channel}” tells the speed of {shaft} in {runs}, {speeds}",
             kind=kind,
             channel=teller,
             shaft=what,

@@ -15,9 +15,10 @@ from tdacoustic.reporting.document import (
     Paragraph,
     Section,
     Sentences,
+    Shown,
     Table,
 )
-from tdacoustic.reporting.language import say, say_count
+from tdacoustic.reporting.language import mark, say, say_count
 from tdacoustic.reporting.sections.folding import few, in_sight
 from tdacoustic.reporting.sections.item_tables import item_table
 from tdacoustic.reporting.sections.tones_figures import audibility_figure, criterion_figure, run_up_figures
@@ -26,6 +27,7 @@ from tdacoustic.reporting.sections.tones_words import (
     ECMA,
     ISO,
     VERDICTS,
+    is_silent,
     most_audible,
     origin_words,
     rated_runs,
@@ -42,6 +44,10 @@ __all__ = ["tones"]
 
 NAMED_PLACES = 6
 MORE_THAN_ALL = 0.99
+SILENT = mark(
+    "A dash in the audibility stands where no tone is audible; the standard then sets it to \N{MINUS SIGN}10 dB."
+)
+"""What a dash in the table means."""
 
 
 def tones(analysis: Analysis) -> Section | None:
@@ -109,13 +115,18 @@ def _audibility() -> list[tuple[Column, Callable[[RunTonality], Cell]]]:
     return [
         (
             Column("mean_audibility_db", say("Mean audibility"), "dB", 1, "number"),
-            lambda rating: rating.mean_audibility_db,
+            lambda rating: _unless_silent(rating, rating.mean_audibility_db),
         ),
         (
             Column("uncertainty_db", "\N{PLUS-MINUS SIGN}", "90 %, dB", 1, "number"),
-            lambda rating: rating.uncertainty_db,
+            lambda rating: _unless_silent(rating, rating.uncertainty_db),
         ),
     ]
+
+
+def _unless_silent(rating: RunTonality, value: float | None) -> Cell:
+    """A number of a rating; a dash where no tone is audible, the standard's own value in the download."""
+    return Shown("\N{EN DASH}", value) if is_silent(rating) else value
 
 
 def _table(analysis: Analysis, found: Tonality) -> Table:
@@ -141,7 +152,10 @@ def _table(analysis: Analysis, found: Tonality) -> Table:
         (Column("most_audible", say("Most audible")), strongest),
         (Column("prominent", say("Prominent by ECMA-418-1")), lambda rating: _prominent_cell(found, rating)),
     ]
-    return item_table("tonality", say("How tonal each microphone is"), rated, columns, analysis.campaign.origin)
+    caption = say("How tonal each microphone is")
+    if any(is_silent(rating) for rating in rated):
+        caption = " ".join([f"{caption}.", say(SILENT)])
+    return item_table("tonality", caption, rated, columns, analysis.campaign.origin)
 
 
 def _prominent_cell(found: Tonality, rating: RunTonality) -> str:
@@ -182,7 +196,9 @@ def _more_tables(analysis: Analysis, found: Tonality) -> list[Block]:
             (Column("n_spectra", say("Spectra"), "", 0, "number"), lambda rating: rating.n_spectra),
         ]
         caption = say("Audibility by speed class ({method})", method=ISO)
-        table = item_table("tonality-classes", caption, classes, columns)
+        if any(is_silent(rating) for rating in classes):
+            caption = " ".join([f"{caption}.", say(SILENT)])
+        table = item_table("tonality-classes", caption, classes, columns, analysis.campaign.origin)
         words = say_count("Run-ups: {count} speed class", "Run-ups: {count} speed classes", len(classes))
         blocks.append(Details(words, [table]))
     if found.tones:

@@ -12,12 +12,14 @@ from tdacoustic.reporting.sections.folding import few
 from tdacoustic.reporting.sections.words import condition_words, joined, pretty_signs, source_word, tested_runs
 from tdacoustic.reporting.shown import range_text
 from tdacoustic.results import Analysis
+from tdacoustic.tones.audibility import NO_TONE_DB
 
 __all__ = [
     "DIN",
     "ECMA",
     "ISO",
     "VERDICTS",
+    "is_silent",
     "most_audible",
     "origin_words",
     "rated_runs",
@@ -31,6 +33,8 @@ __all__ = [
 ISO, DIN, ECMA = "ISO/TS 20065:2022", "DIN 45681:2005-03", "ECMA-418-1:2024"
 """Methods, as the tables have them."""
 NAMED_TONES = 3
+ROUNDING_DB = 1e-6
+"""Of a mean over equal levels."""
 
 VERDICTS = {
     "tonal": mark("tonal"),
@@ -62,6 +66,11 @@ def verdict_of(rating: RunTonality | None) -> str:
     if mean - around > 0.0:
         return "tonal"
     return "open" if mean + around > 0.0 else "not tonal"
+
+
+def is_silent(rating: RunTonality) -> bool:
+    """Return whether no tone is audible in any spectrum, so that the mean is the value the standard sets for none."""
+    return rating.mean_audibility_db is not None and rating.mean_audibility_db <= NO_TONE_DB + ROUNDING_DB
 
 
 def rated_runs(analysis: Analysis, condition: str) -> list[MeasuredRun]:
@@ -156,6 +165,8 @@ def _verdict_words(run: MeasuredRun, rating: RunTonality, verdicts: Sequence[str
     verdict = verdict_of(rating)
     words = say("open, within its uncertainty") if verdict == "open" else say(VERDICTS[verdict])
     mean, around = rating.mean_audibility_db, rating.uncertainty_db or 0.0
+    if is_silent(rating):  # of the highest, so of all of them
+        return say("{verdict}, no audible tone (ISO/TS 20065)", verdict=words)
     if len(verdicts) == 1:
         known = say("mean audibility {mean:.1f} ± {uncertainty:.1f} dB (ISO/TS 20065)", mean=mean, uncertainty=around)
         return f"{words}, {known}"

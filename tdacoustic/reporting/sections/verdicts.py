@@ -9,7 +9,7 @@ from tdacoustic.attribution.dominance import DECIDED
 from tdacoustic.reporting.document import Block, Cell, Column, FigureBlock, Paragraph, Shown, Table
 from tdacoustic.reporting.figure import Axis, Bars, Figure
 from tdacoustic.reporting.language import say
-from tdacoustic.reporting.sections.words import OWNER_SLOTS, probability_words, source_word
+from tdacoustic.reporting.sections.words import OWNER_HATCHES, OWNER_SLOTS, probability_words, source_word
 from tdacoustic.results import Analysis
 
 __all__ = ["verdicts_answer"]
@@ -36,7 +36,7 @@ def verdicts_answer(analysis: Analysis) -> list[Block]:
     categories = [f"{verdict.condition}: {source_word(verdict.dominant)}" for verdict in judged]
     shares = {name: np.array([100.0 * verdict.shares.get(name, 0.0) for verdict in judged]) for name in OWNER_SLOTS}
     bars = [
-        Bars(categories, shares[name], source_word(name), color=slot)
+        Bars(categories, shares[name], source_word(name), color=slot, hatch=OWNER_HATCHES.get(name))
         for name, slot in OWNER_SLOTS.items()
         if np.any(shares[name] > 0.0)
     ]

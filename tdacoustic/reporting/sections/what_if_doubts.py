@@ -70,7 +70,7 @@ def interval_words(answer: WhatIfAnswer, fleet: Fleet) -> str:
     rest = say(
         "Not in them is what parameters that were not fitted are off by beyond that, sound that the model does not "
         "have, and whether a measure keeps what it promises. The levels in the table are the "
-        "model's; of a measured level a change holds as far as these lines make it."
+        "model's; of a recorded level a change holds as far as these lines make it."
     )
     return " ".join([f"{', '.join(clauses)}.", *alone, rest])
 

@@ -120,4 +120,4 @@ def what_if_table(answer: WhatIfAnswer, name: str, caption: str, levels: Iterabl
         for pair in ends:
             row += [None, None] if pair is None else list(pair)
         rows.append(row)
-    return Table(name, caption, columns, rows, csv=f"{name}.csv" if everywhere else None, origin="calculated")
+    return Table(name, caption, columns, rows, origin="calculated")

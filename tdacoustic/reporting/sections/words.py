@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Final
 
 from tdacoustic.attribution import SourceLine
 from tdacoustic.measured import ChannelResult
 from tdacoustic.measured.runs import MeasuredRun
 from tdacoustic.recording import Channel
+from tdacoustic.reporting.figure import Hatch
 from tdacoustic.reporting.language import mark, say
 from tdacoustic.results import Analysis
 
 __all__ = [
+    "OWNER_HATCHES",
     "OWNER_SLOTS",
     "OWNER_SLOT_OTHER",
     "SHAFT_WORDS",
@@ -36,6 +39,8 @@ __all__ = [
 ]
 
 OWNER_SLOTS = {"motor": 0, "gearbox": 1, "ambiguous": 3, "unassigned": 7}
+OWNER_HATCHES: Final[Mapping[str, Hatch]] = {"gearbox": "/", "ambiguous": "x", "unassigned": ".", "undecided": "."}
+"""Of bars, beside their colour."""
 """Colour of a source, the same in every figure."""
 OWNER_SLOT_OTHER = 2
 
