@@ -57,6 +57,7 @@ def conformance(request: pytest.FixtureRequest) -> Callable[..., None]:
         unit: str,
         source: str,
         note: str = "",
+        *,
         deviates: bool = False,
     ) -> None:
         row = Row(request.node.nodeid, what, float(expected), float(got), float(tolerance), unit, source, note)

@@ -20,16 +20,16 @@ from tdacoustic.units import (
 DEFINITIONS = {  # spelling: (value in SI of 1 unit, SI symbol, source)
     "g": (9.80665, "m/s^2", "standard: 3rd CGPM (1901), standard acceleration of gravity"),
     "psi": (0.45359237 * 9.80665 / 0.0254**2, "Pa", "standard: international yard and pound agreement (1959)"),
-    "bar": (1e5, "Pa", "standard: SI Brochure, 8th ed. (2006), table 8"),
-    "mbar": (100.0, "Pa", "standard: SI Brochure, 8th ed. (2006), table 8"),
+    "bar": (1e5, "Pa", "standard: Directive 80/181/EEC, annex, chapter I, 1.4: 1 bar = 10⁵ Pa"),
+    "mbar": (100.0, "Pa", "standard: Directive 80/181/EEC, annex, chapter I, 1.4: 1 bar = 10⁵ Pa"),
     "rpm": (1.0 / 60.0, "1/s", "analytic: one turn in 60 s"),
     "tr/min": (1.0 / 60.0, "1/s", "analytic: one turn in 60 s"),
     "deg/s": (1.0 / 360.0, "1/s", "analytic: one turn is 360 deg"),
     "rad/s": (0.15915494309189535, "1/s", "analytic: one turn is 2 pi rad"),
     "km/h": (0.2777777777777778, "m/s", "analytic: 1000 m in 3600 s"),
-    "m/s²": (1.0, "m/s^2", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
-    "kN m": (1000.0, "N m", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
-    "µPa": (1e-6, "Pa", "standard: SI Brochure, 9th ed. (2019), prefixes and coherent units"),
+    "m/s²": (1.0, "m/s^2", "standard: SI Brochure, 9th ed. (2019), SI prefixes and coherent derived units"),
+    "kN m": (1000.0, "N m", "standard: SI Brochure, 9th ed. (2019), SI prefixes and coherent derived units"),
+    "µPa": (1e-6, "Pa", "standard: SI Brochure, 9th ed. (2019), SI prefixes and coherent derived units"),
 }
 
 

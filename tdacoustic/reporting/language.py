@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from tdacoustic.errors import TemplateError
-from tdacoustic.phrases import Phrase
 from tdacoustic.toml_models import small_file
 
 if TYPE_CHECKING:
@@ -85,8 +84,7 @@ def say(text: str, /, **values: object) -> str:
     Parameters
     ----------
     text : str
-        English, written out where it is said, or marked by `mark`; ``{name}`` is filled in where values are given. A
-        text of a result (`Phrase`) is said with its own values; any other one of a result stays as it is.
+        English, written out where it is said, or marked by `mark`; ``{name}`` is filled in where values are given.
     **values
         What is filled in, formatted as `str.format` does. Braces in them stay as they are.
 
@@ -95,19 +93,8 @@ def say(text: str, /, **values: object) -> str:
     >>> say("Level at {distance:g} m", distance=4.0)
     'Level at 4 m'
     """
-    if isinstance(text, Phrase):
-        return _said_again(text)
     said = _SPOKEN.get().texts.get(text, text)
     return said.format(**values) if values else said
-
-
-def _said_again(made: Phrase) -> str:
-    values = {name: say(value) if isinstance(value, Phrase) else value for name, value in made.values.items()}
-    if made.many is None:
-        return say(made.text, **values)
-    count = made.values["count"]
-    assert isinstance(count, int)
-    return say_count(made.text, made.many, count, **{name: v for name, v in values.items() if name != "count"})
 
 
 def say_count(one: str, many: str, count: int, /, **values: object) -> str:

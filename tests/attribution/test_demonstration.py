@@ -66,8 +66,8 @@ def test_every_noise_line_of_table_2_is_found_and_no_other(tables, conformance):
             assert len(held) == len(wanted), (condition, receiver, list(held))
             for frequency in wanted:
                 nearest = min(held, key=lambda found, frequency=frequency: abs(found - frequency))
-                what = f"noise line of condition {condition}, {receiver}"
-                conformance(what, frequency, nearest, 2.0, "Hz", PUT_IN + "Table 2")
+                what = f"noise line at {frequency:g} Hz of condition {condition}, {receiver}"
+                conformance(what, frequency, nearest, 1.0, "Hz", PUT_IN + "Table 2")  # sensors differ by 1 Hz there
 
 
 def test_the_vibration_lines_are_those_of_table_2(tables):

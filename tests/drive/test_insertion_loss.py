@@ -17,7 +17,9 @@ from tdacoustic.drive.insertion_loss import LEAST_A_BAND, LINES_A_WIDTH, MOST_LI
 from tdacoustic.drive.source_inside import SourceInside, _cavity
 from tdacoustic.radiation import mean_over_sphere_db
 
-FAHY = "literature: 20 lg(m f) - 47 dB, Fahy and Gardonio, Sound and Structural Vibration, 2nd ed., chapter 5"
+FIELD_INCIDENCE = (
+    "literature: mass law of field incidence, 20 lg(m f) - 47 dB (Fahy and Gardonio, Sound and Structural Vibration)"
+)
 
 STEEL_KG_M3 = 7850.0
 
@@ -101,7 +103,7 @@ def test_walls_and_mass_law_by_hand(loss_of, conformance):
     frequency = held.frequency_hz[place]
     through = sum(area * 10.0 ** (4.7 - 2.0 * math.log10(STEEL_KG_M3 * t * frequency)) for area, t in by_hand)
     rule = -10.0 * math.log10(through / sum(area for area, _ in by_hand))
-    conformance("mass law of 6 and 8 mm", rule, held.mass_law_db[place], 0.6, "dB", FAHY)
+    conformance("mass law of 6 and 8 mm", rule, held.mass_law_db[place], 0.5, "dB", FIELD_INCIDENCE)
 
 
 def test_an_absorption_coefficient_is_that_of_sabine(loss_of, conformance):

@@ -69,15 +69,15 @@ def test_geometry_of_the_truth_is_that_of_the_program(study, conformance):
     ours = td.DriveModel(td.load_fleet(REFERENCE_DRIVE)).unit.geometry
     true = geometry(TrueDrive().numbers["gear_pair"][0])
     source = "independent: involute geometry of ISO 21771 written anew, tests/evidence/drive_levels.py"
-    for what, expected, got in (
-        ("helix angle", true.helix_rad, ours.helix_angle_rad),
-        ("working pressure angle", true.working_angle_rad, ours.working_pressure_angle_rad),
-        ("pinion's base radius", true.base_radii_m[0], ours.base_radii_m[0]),
-        ("transverse contact ratio", true.transverse_contact_ratio, ours.transverse_contact_ratio),
-        ("overlap ratio", true.overlap_ratio, ours.overlap_ratio),
-        ("pinion's working pitch radius", true.pitch_radius_m, ours.pitch_radii_m[0]),
+    for what, expected, got, unit in (
+        ("helix angle", true.helix_rad, ours.helix_angle_rad, "rad"),
+        ("working pressure angle", true.working_angle_rad, ours.working_pressure_angle_rad, "rad"),
+        ("pinion's base radius", true.base_radii_m[0], ours.base_radii_m[0], "m"),
+        ("transverse contact ratio", true.transverse_contact_ratio, ours.transverse_contact_ratio, "1"),
+        ("overlap ratio", true.overlap_ratio, ours.overlap_ratio, "1"),
+        ("pinion's working pitch radius", true.pitch_radius_m, ours.pitch_radii_m[0], "m"),
     ):
-        conformance(f"reference drive, {what}", expected, got, 1e-9 * abs(expected), "SI", source)
+        conformance(f"reference drive, {what}", expected, got, 1e-9 * abs(expected), unit, source)
 
 
 @pytest.mark.parametrize(

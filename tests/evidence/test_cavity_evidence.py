@@ -27,22 +27,23 @@ def test_a_limp_wall_follows_the_mass_law(record, conformance):
     found, finite = np.array(record["limp_db"]), np.array(record["limp_finite_db"])
     worst = float(np.abs(found - finite).max())
     conformance(
-        "limp wall, 250 to 1000 Hz, worst band",
+        "sound reduction of a limp wall, 250 to 1000 Hz, worst band",
         0.0,
         worst,
         1.0,
         "dB",
         "analytic: mass law of a limp wall of this size, plane waves",
+        "few modes of a small cavity in a band: its field is not diffuse",
     )
     octaves = np.log2(np.array(record["bands_hz"][: len(found)]))
     slope = float(np.polyfit(octaves, found, 1)[0])
     own = float(np.polyfit(octaves, finite, 1)[0])
     conformance(
-        "limp wall, slope",
+        "sound reduction of a limp wall, rise",
         own,
         slope,
         0.5,
-        "dB an octave",
+        "dB/octave",
         "analytic: mass law of a limp wall of this size, plane waves",
     )
     above = found - np.array(record["limp_infinite_db"])
@@ -53,7 +54,7 @@ def test_steel_has_its_dip_at_coincidence(record, conformance):
     """12 mm: c²/(2π) √(m/D) = 997 Hz; above it the infinite plate's law, rising by some 9 dB an octave."""
     bands, found = np.array(record["bands_hz"]), np.array(record["steel_db"])
     conformance(
-        "12 mm of steel, dip",
+        "dip of the sound reduction of 12 mm of steel",
         1000.0,
         float(bands[found.argmin()]),
         1.0,
@@ -64,10 +65,10 @@ def test_steel_has_its_dip_at_coincidence(record, conformance):
     above = bands > 1500.0
     worst = float(np.abs(found - np.array(record["steel_infinite_db"]))[above].max())
     conformance(
-        "12 mm of steel, 1600 and 2000 Hz, worst",
+        "sound reduction of 12 mm of steel, 1600 and 2000 Hz, worst",
         0.0,
         worst,
-        1.0,
+        0.5,
         "dB",
         "analytic: thin infinite plate at field incidence",
     )

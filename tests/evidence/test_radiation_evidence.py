@@ -134,4 +134,5 @@ def test_a_row_of_the_sphere_again(study, record, fields, conformance):
         assert row in record["comparisons"] or row["reference"] == "series"
         what = f"sphere of five motions, ka = 2, 384 panels, against {row['reference']}: L2 difference at 4 m"
         source = sourced(row["reference"])
-        conformance(what, 0.0, row["l2_at_4_m_percent"], 4.0, "%", source)
+        note = "the coarsest grid of the study, 8 by 8 panels on each of six faces; the error falls with the grid"
+        conformance(what, 0.0, row["l2_at_4_m_percent"], 4.0, "%", source, note)

@@ -28,10 +28,13 @@ def test_speeds_that_are_found_are_right(record, start, conformance):
     assert got["runs"] == 200
     source = "known input: 200 run-ups of known speed, tests/evidence/tacholess_study.py"
     wrong = got["wrong_harmonic"] / got["found"]
-    conformance(f"wrong harmonics, start {start}", 0.0, wrong, 0.02, "1", source)
+    few = "chance of a few among 200 runs"
+    conformance(f"share of wrong harmonics, start {start}", 0.0, wrong, 0.02, "1", source, few)
     conformance(f"rms speed error, all runs, start {start}", 0.0, got["rms_all"], 0.003, "1", source)
     conformance(f"rms speed error, median run, start {start}", 0.0, got["rms_median"], 5e-4, "1", source)
-    conformance(f"runs whose speed is found, start {start}", 1.0, got["found"] / got["runs"], 0.2, "1", source)
+    refused = "a run whose speed cannot be told is left out, by design: one in five at most"
+    share = got["found"] / got["runs"]
+    conformance(f"share of runs whose speed is found, start {start}", 1.0, share, 0.2, "1", source, refused)
 
 
 @pytest.mark.parametrize("start", ["unknown", "known"])

@@ -34,7 +34,9 @@ def drive():
 def test_table_1(drive, conformance, condition, km_h, rpm, hz):
     motor_hz = drive.motor_hz_at_km_h(km_h)
     what, source = f"condition {condition}, {km_h} km/h", "paper: Table 1"
-    conformance(f"{what}: motor speed", rpm, 60.0 * motor_hz, 0.05, "rpm", source)
+    # Printed to 0.01, and cut rather than rounded.
+    note = "1015.90 rpm contradict the 524.90 Hz printed beside them, which are 1015.94 rpm" if condition == "5" else ""
+    conformance(f"{what}: motor speed", rpm, 60.0 * motor_hz, 0.011, "rpm", source, note, deviates=bool(note))
     conformance(f"{what}: mesh frequency", hz, drive.mesh_hz(motor_hz)["1"], 0.01, "Hz", source)
 
 

@@ -162,10 +162,10 @@ def test_error_falls_with_the_number_of_harmonics_as_theory_says(
         waveform.append(np.abs(series_at(found[: number + 1], phases) - exact).max())
         low.append(np.abs(found[1:4] - fine[1:4]).max())
     source = "analytic: order at which the Fourier series of the stiffness falls"
+    note = "the last harmonics lie anywhere in the lobes of the stiffness series, which scatters the fit"
     for what, errors, order in (("delta", waveform, waveform_order), ("harmonics 1 to 3", low, harmonic_order)):
         observed = -np.polyfit(np.log(numbers), np.log(errors), 1)[0]
-        # Their last harmonics lie anywhere in the lobes of the stiffness series, which scatters the fit.
-        conformance(f"order of convergence of {what}, {name}", order, observed, 0.5, "1", source)
+        conformance(f"order of convergence of {what}, {name}", order, observed, 0.5, "1", source, note)
 
 
 def test_tail_is_no_smaller_than_the_error_of_helical_teeth():

@@ -252,17 +252,26 @@ def test_what_repeats_every_turn_and_what_is_left(steady, conformance):
     motor, wheelset = steady.channels[0].averages
     assert (motor.shaft, wheelset.shaft) == ("motor", "wheelset")
     lines = np.abs(motor.amplitudes)
-    conformance("mesh in the synchronous average", 1.0, lines[31], 0.005, "", PUT_IN)
-    conformance("its sidebands", 0.15, 0.5 * (lines[30] + lines[32]), 0.005, "", PUT_IN)
+    conformance("mesh in the synchronous average", 1.0, lines[31], 0.005, "1", PUT_IN)
+    conformance(
+        "sidebands of the mesh in the synchronous average", 0.15, 0.5 * (lines[30] + lines[32]), 0.005, "1", PUT_IN
+    )
     # The average of N turns keeps 1/N of what does not repeat: 600 turns, so 0.25 % of 0.7²/2 at most.
-    conformance("residual: the line that does not turn", 0.245, motor.residual_mean_square, 0.01, "", PUT_IN)
+    conformance(
+        "residual of the synchronous average: mean square of a line fixed in Hz",
+        0.245,
+        motor.residual_mean_square,
+        0.01,
+        "1",
+        PUT_IN,
+    )
     assert np.abs(wheelset.amplitudes)[104] == pytest.approx(1.0, abs=0.01)
     assert motor.periods == pytest.approx(600, abs=2)
 
 
 def test_sidebands_tell_the_modulation(steady, conformance):
     families = {item.spacing: item.family for item in steady.channels[0].sidebands}
-    conformance("amplitude modulation by the motor shaft", 0.3, families["motor shaft"].amplitude_depth[0], 0.01, "",
+    conformance("amplitude modulation by the motor shaft", 0.3, families["motor shaft"].amplitude_depth[0], 0.01, "1",
                 PUT_IN)  # fmt: skip
     assert families["motor shaft"].pairs[0] == 1 and families["wheelset"].pairs[0] == 0
 

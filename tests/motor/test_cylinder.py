@@ -9,8 +9,8 @@ from scipy.special import jvp, yvp
 from tdacoustic.errors import MotorError
 from tdacoustic.motor import relative_intensity
 
-LARGE = "analytic: 2 / (pi x |H'|²) for large x, Hankel's expansion (DLMF 10.17)"
-SMALL = "analytic: 2 / (pi x |H'|²) for small x, leading terms (DLMF 10.7)"
+LARGE = "analytic: 2 / (pi x |H'|²) for large x, Hankel's expansion of the derivative (DLMF, 10.17.11)"
+SMALL = "analytic: 2 / (pi x |H'|²) for small x, limiting forms (DLMF, 10.7(i))"
 
 SIZES = np.logspace(-3, 3, 25)
 

@@ -29,7 +29,7 @@ def test_the_vold_kalman_filter_is_the_same(conformance):
         there = theirs[np.rint(found.times_s * RUN.rate_hz).astype(int), index]
         apart = np.max(np.abs(found.amplitude[0] - there)[good])
         # What differs beside the ends, where the other keeps the mirror image: some 1e-4, and 1e-7 elsewhere.
-        conformance(f"Vold-Kalman beside rota-order, order {index + 1}", 0.0, apart, 5e-4, "unit",
+        conformance(f"Vold-Kalman beside rota-order, order {index + 1}", 0.0, apart, 5e-4, "1",
                     "program: rota-order")  # fmt: skip
 
 

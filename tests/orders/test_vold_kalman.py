@@ -52,13 +52,15 @@ def test_the_passband_is_the_stated_one(poles, away, conformance):
     gain = np.abs(found.amplitude[0, 400:-400]).mean()
     expected = 1.0 / (1.0 + (np.sqrt(2.0) - 1.0) * away ** (2 * poles))
     # Cubic splines are rougher than the waves they stand for, 16 nodes a 1 / B: some 0.002 beside B, where it is exact.
+    tolerance = min(2e-3, 0.2 * expected)
     conformance(
         f"Vold-Kalman {poles} poles, gain {away:g} bandwidths away",
         expected,
         gain,
-        2e-3,
+        tolerance,
         "1",
-        "analytic: gain of the Vold-Kalman filter over frequency",
+        "analytic: 1 / (1 + (sqrt 2 - 1) (2 Δf / B)^2p), gain of the Vold-Kalman filter of p poles",
+        "far off the band: splines stand for the waves" if tolerance > 0.1 * expected else "",
     )
 
 
@@ -146,7 +148,8 @@ def test_amplitude_modulation_is_followed(conformance):
         error = np.max(np.abs(error_of(found, rms, phase)))
         # 0.5 Hz in a band of 3 Hz: 1 - H is 1.1 %, 0.03 % and below 0.01 % of the modulation for 1, 2, 3 poles.
         conformance(f"modulation at a sixth of the bandwidth, {poles} poles", 0.0, error,
-                    {1: 0.02, 2: 2e-3, 3: 1e-3}[poles], "1", PUT_IN)  # fmt: skip
+                    {1: 0.02, 2: 2e-3, 3: 1e-3}[poles], "1", PUT_IN,
+                    "one pole takes 1.1 % off this modulation" if poles == 1 else "")  # fmt: skip
 
 
 def test_ten_db_below_the_floor(conformance):
@@ -157,7 +160,8 @@ def test_ten_db_below_the_floor(conformance):
     (found,) = track(run, run.order(8.0, rms, 0.7) + run.noise(density), [TrackedOrder(angle_of(run), 8.0, 0.05)], 1)
     good = found.reason[0] == 0
     level = float(db(np.abs(np.mean(found.amplitude[0, good])) / rms))
-    conformance("order 10 dB below the floor, Vold-Kalman of 0.05 Hz, mean level", 0.0, level, 2.0, "dB", PUT_IN)
+    note = "three times the scatter of one record of 60 s in 0.05 Hz"
+    conformance("order 10 dB below the floor, Vold-Kalman of 0.05 Hz, mean level", 0.0, level, 2.0, "dB", PUT_IN, note)
 
 
 def test_stated_errors_cover_the_truth(conformance):
@@ -177,6 +181,7 @@ def test_stated_errors_cover_the_truth(conformance):
                 0.25,
                 "1",
                 PUT_IN,
+                "an error of an error, of one record with some hundred independent values",
             )
 
 

@@ -100,7 +100,15 @@ def test_a_cap_moving_on_a_rigid_sphere(conformance, ka):
     exact *= -1j * IMPEDANCE
     found = ExteriorProblem(surface, ka, IMPEDANCE).transfer(points, moving[:, None])[:, 0]
     error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
-    conformance(f"cap piston on a sphere, ka = {ka:.4g}: L2 error", 0.0, 100.0 * error, 2.5, "%", SOURCE)
+    conformance(
+        f"cap piston on a sphere, ka = {ka:.4g}: L2 error",
+        0.0,
+        100.0 * error,
+        2.5,
+        "%",
+        SOURCE,
+        "the cap's edge, a jump of the velocity, crosses panels",
+    )
 
 
 @pytest.mark.parametrize("ka", [1.0, np.pi, 5.0])

@@ -164,7 +164,15 @@ def test_a_box_with_sources_inside_converges(conformance):
         pressures = problem.transfer(points, velocity)
         found.append((np.linalg.norm(pressures - exact, axis=0) / np.linalg.norm(exact, axis=0)).max())
     source = "analytic: fields of point sources inside the box"
-    conformance("box at 1 kHz, 6 panels a wavelength: L2 error at 4 m", 0.0, 100.0 * found[0], 4.0, "%", source)
+    conformance(
+        "box at 1 kHz, 6 panels a wavelength: L2 error at 4 m",
+        0.0,
+        100.0 * found[0],
+        4.0,
+        "%",
+        source,
+        "a coarse grid: the next row has the fine one",
+    )
     conformance("box at 1 kHz, 12 panels a wavelength: L2 error at 4 m", 0.0, 100.0 * found[1], 1.2, "%", source)
     assert np.log2(found[0] / found[1]) > 1.2
 

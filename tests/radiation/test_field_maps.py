@@ -60,7 +60,8 @@ def test_sources_inside_up_to_the_walls(body, conformance, frequency_hz, distanc
     exact = field_of(points, wave)[0]
     error = np.linalg.norm(found - exact) / np.linalg.norm(exact)
     name = f"sources in a box, {frequency_hz:.0f} Hz, {1e3 * distance_m:.0f} mm off its walls: L2 error"
-    conformance(name, 0.0, 100.0 * error, 100.0 * most, "%", "analytic: point sources in free space")
+    near = "near the walls the grid of panels is felt; a map shows differences of 1 dB, which are 12 %"
+    conformance(name, 0.0, 100.0 * error, 100.0 * most, "%", "analytic: point sources in free space", near)
 
 
 def test_a_point_source_before_a_wide_rigid_wall_has_its_image(conformance):

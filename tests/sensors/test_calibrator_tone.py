@@ -59,9 +59,9 @@ def level_error_db(plateau, rms=1.0):
 )
 def test_level_and_frequency_of_a_sine(hz, noise, rate, tolerance_db, conformance):
     (plateau,), _ = read(tone(hz=hz, noise=noise, rate=rate, thump=0.0), (hz,), rate)
-    source = f"known input: a calibrator's tone of {hz:g} Hz, noise of {noise:g} of it"
-    conformance("level of a calibrator's tone", 0.0, level_error_db(plateau), tolerance_db, "dB", source)
-    conformance("frequency of a calibrator's tone", hz, plateau.frequency_hz, 2e-5 * hz, "Hz", source)
+    what, source = f"calibrator's tone of {hz:g} Hz in noise of {noise:g} of it", "known input: a sine in white noise"
+    conformance(f"level of a {what}", 0.0, level_error_db(plateau), tolerance_db, "dB", source)
+    conformance(f"frequency of a {what}", hz, plateau.frequency_hz, 2e-5 * hz, "Hz", source)
     assert plateau.residue_db == pytest.approx(20 * math.log10(noise), abs=1.5) or noise < 1e-3
 
 
@@ -145,6 +145,11 @@ def test_distortion_is_that_of_the_harmonics(conformance):
     signal = np.sin(2 * np.pi * 1000.0 * t) + 0.05 * np.sin(2 * np.pi * 3000.0 * t)
     (plateau,) = read(signal)[0]
     conformance(
-        "distortion", 0.05, plateau.distortion, 0.0005, "1", "known input: a sine and 5 % of its third harmonic"
+        "distortion of a calibrator's tone",
+        0.05,
+        plateau.distortion,
+        0.0005,
+        "1",
+        "known input: a sine and 5 % of its third harmonic",
     )
     assert abs(level_error_db(plateau, math.sqrt(0.5))) < 0.001

@@ -29,11 +29,12 @@ TABLE_4 = (  # burst in ms, LAFmax - LA, LASmax - LA, LAE - LA, class 1 limits f
 )
 """IEC 61672-1:2013, table 4, as phonometry's reference data (MIT) give it."""
 
-TABLE_3 = {  # nominal frequency: (exponent re 1 kHz in tenths of a decade, class 1 limits)
-    63: (-12, 1.0, -1.0), 125: (-9, 1.0, -1.0), 250: (-6, 1.0, -1.0), 500: (-3, 1.0, -1.0), 1000: (0, 0.7, -0.7),
-    2000: (3, 1.0, -1.0), 4000: (6, 1.0, -1.0), 8000: (9, 1.5, -2.5), 16000: (12, 2.5, -16.0),
+TABLE_3 = {  # nominal frequency: (exponent re 1 kHz in tenths of a decade, A weighting, class 1 limits)
+    63: (-12, -26.2, 1.0, -1.0), 125: (-9, -16.1, 1.0, -1.0), 250: (-6, -8.6, 1.0, -1.0), 500: (-3, -3.2, 1.0, -1.0),
+    1000: (0, 0.0, 0.7, -0.7), 2000: (3, 1.2, 1.0, -1.0), 4000: (6, 1.0, 1.0, -1.0), 8000: (9, -1.1, 1.5, -2.5),
+    16000: (12, -6.6, 2.5, -16.0),
 }  # fmt: skip
-"""Class 1 acceptance limits of IEC 61672-1:2013, table 3, at the frequencies of the periodic test (phonometry)."""
+"""IEC 61672-1:2013, table 3, at the frequencies of the periodic test, as the program phonometry quotes it."""
 
 
 def history(x, rate=51200.0, cuts=(), weighting="A", **options):
@@ -95,7 +96,7 @@ def test_the_filter_follows_the_analytic_curve(rate, conformance):
 @pytest.mark.parametrize("rate", RATES)
 @pytest.mark.parametrize("nominal", TABLE_3)
 def test_the_filter_is_of_class_1(rate, nominal, conformance):
-    exponent, above, below = TABLE_3[nominal]
+    exponent, weighting_db, above, below = TABLE_3[nominal]
     frequency = 1000.0 * 10.0 ** (exponent / 10.0)
     if frequency > 0.45 * rate:
         pytest.skip("beyond what the rate holds")
@@ -103,15 +104,14 @@ def test_the_filter_is_of_class_1(rate, nominal, conformance):
     t = np.arange(int(seconds * rate)) / rate
     found = history(math.sqrt(2.0) * np.sin(2.0 * np.pi * frequency * t), rate)
     got = db(found.mean_square[0, 100:].mean())
-    design = float(curve_db(frequency))
-    assert below <= got - design <= above
+    assert below <= got - float(curve_db(frequency)) <= above
     conformance(
-        f"A-weighted level of a sine at {nominal} Hz, rate {rate:g} Hz, less the curve",
-        0.0,
-        got - design,
-        min(above, -below),
+        f"A-weighted level of a sine at {nominal} Hz, rate {rate:g} Hz",
+        weighting_db,
+        got,
+        0.06,  # printed to 0.1 dB; class 1 would allow 0.7 dB and more
         "dB",
-        "standard: IEC 61672-1:2013, table 3, class 1, as quoted by the program phonometry",
+        "standard: IEC 61672-1:2013, table 3, as quoted by the program phonometry",
     )
 
 

@@ -81,9 +81,9 @@ def test_the_engines_three_tones_as_one(conformance):
     _, kept, _ = rated(levels, printed.ENGINE_LINES_HZ, 137.3)
     tone_levels = np.array([row[2] for row in printed.ENGINE_TONES[:3]])
     uncertainty = audibility_uncertainty_db(tone_levels, levels[kept], 137.3, printed.ENGINE_SPACING_HZ)
-    conformance("its uncertainty", group[2], uncertainty, 0.01, "dB", E2)
+    conformance("uncertainty of the audibility of three tones", group[2], uncertainty, 0.01, "dB", E2)
     audibility = level - printed.ENGINE_TONES[1][4] - masking_index_db(137.3)
-    conformance("its audibility", group[1], audibility, 0.02, "dB", E2)
+    conformance("audibility of three tones of one critical band", group[1], audibility, 0.02, "dB", E2)
 
 
 @pytest.mark.parametrize("number", range(5))
@@ -97,7 +97,7 @@ def test_the_mean_over_the_engines_spectra(conformance):
     mean, uncertainty = mean_audibility(printed.ENGINE_DECISIVE_DB, printed.ENGINE_DECISIVE_UNCERTAINTY_DB)
     # 6.96 dB follows to the last digit with 9.12 dB for spectrum 1, which is its second group (at 592.2 Hz).
     conformance("mean audibility of five spectra", printed.ENGINE_MEAN_DB, mean, 0.02, "dB", E3)
-    conformance("its uncertainty", printed.ENGINE_MEAN_UNCERTAINTY_DB, uncertainty, 0.01, "dB", E3)
+    conformance("uncertainty of the mean audibility", printed.ENGINE_MEAN_UNCERTAINTY_DB, uncertainty, 0.01, "dB", E3)
 
 
 def test_the_tone_adjustment():

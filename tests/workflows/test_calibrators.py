@@ -31,6 +31,7 @@ def tda(call_program, tmp_path, monkeypatch):
     return run
 
 
+PUT_IN = "known input: a calibrator of 94 dB and a sine of 1 Pa in a made-up campaign"
 TRUE_DB = 20 * math.log10(math.hypot(1.0, 0.01) / 20e-6)
 """Of the drive's run: a sine of 1 Pa and a little noise."""
 
@@ -45,12 +46,13 @@ def the(tables, **keys):
     return row
 
 
-def test_a_sensitivity_that_is_wrong_by_3_db_is_said_and_not_changed(tda, tmp_path):
+def test_a_sensitivity_that_is_wrong_by_3_db_is_said_and_not_changed(tda, tmp_path, conformance):
     calibrated_campaign(tmp_path / "c", sensitivity=f"{1e3 * VOLTS_PER_PA * 10 ** (3 / 20):.6g} mV/Pa")
     code, _, err, tables = tda("analyze", tmp_path / "c")
     assert code == 0
     assert "channel 'mic': read -3.00 dB off the stated scale, more than 0.5 dB: a peak value taken for an rms" in err
-    assert float(the(tables, kind="calibration")["deviation_db"]) == pytest.approx(-3.0, abs=0.002)
+    deviation_db = float(the(tables, kind="calibration")["deviation_db"])
+    conformance("error of a sensitivity stated 3 dB too high", -3.0, deviation_db, 0.002, "dB", PUT_IN)
     assert the(tables, run="cal before")["verdict"] == "warning"
     assert level_db(tables) == pytest.approx(TRUE_DB - 3.0, abs=0.005)
     assert tables["levels"][0]["calibration"] == "doubtful"
@@ -58,13 +60,13 @@ def test_a_sensitivity_that_is_wrong_by_3_db_is_said_and_not_changed(tda, tmp_pa
     assert "Levels of mic are doubtful" in report and "Sensors and calibrators" in report
 
 
-def test_a_missing_sensitivity_is_set_and_levels_are_right(tda, tmp_path):
+def test_a_missing_sensitivity_is_set_and_levels_are_right(tda, tmp_path, conformance):
     calibrated_campaign(tmp_path / "c")
     code, _, err, tables = tda("analyze", tmp_path / "c")
     assert (code, err) == (0, "")
     row = the(tables, kind="calibration")
     assert row["sensitivity_set"].startswith("47.3 mV/Pa by calibrator runs cal before, cal after (94 dB)")
-    assert level_db(tables) == pytest.approx(TRUE_DB, abs=0.005)  # asked: 0.05 dB
+    conformance("level by a sensitivity that a calibrator sets", TRUE_DB, level_db(tables), 0.005, "dB", PUT_IN)
     assert tables["levels"][0]["calibration"] == "ok"
     assert float(row["drift_db"]) == pytest.approx(0.0, abs=0.002)
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
@@ -72,14 +74,15 @@ def test_a_missing_sensitivity_is_set_and_levels_are_right(tda, tmp_path):
     assert any(line["check"] == "calibration" and line["run"] == "a" for line in tables["quality"])
 
 
-def test_a_drift_of_0_8_db_is_said_wherever_the_channel_is(tda, tmp_path):
+def test_a_drift_of_0_8_db_is_said_wherever_the_channel_is(tda, tmp_path, conformance):
     calibrated_campaign(tmp_path / "c", sensitivity=f"{1e3 * VOLTS_PER_PA:.6g} mV/Pa", drift_db=0.8)
     code, out, err, tables = tda("check", tmp_path / "c")
     words = "after the runs +0.80 dB against before, more than 0.5 dB: levels between the two are doubtful"
     assert code == 0 and words in out and words in err
     code, _, err, tables = tda("analyze", tmp_path / "c")
     assert code == 0 and words in err
-    assert float(the(tables, kind="calibration")["drift_db"]) == pytest.approx(0.8, abs=0.002)
+    drift_db = float(the(tables, kind="calibration")["drift_db"])
+    conformance("drift between two calibrations", 0.8, drift_db, 0.002, "dB", PUT_IN)
     assert tables["levels"][0]["calibration"] == "doubtful"
     assert level_db(tables) == pytest.approx(TRUE_DB, abs=0.005)  # checked, not changed
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

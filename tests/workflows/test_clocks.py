@@ -76,14 +76,15 @@ def order_levels(analysis):
     return dict(zip(rows["speed_rpm"], rows["level_db"], strict=True))
 
 
-def test_two_recorders_are_put_on_one_axis(tmp_path):
+def test_two_recorders_are_put_on_one_axis(tmp_path, conformance):
     path = campaign(tmp_path, align_on=["sync"])
     path.write_text(path.read_text() + "[analysis]\norders = [4.0]\n")
     found = analyze(path, tmp_path / "store")
     (row,) = found.tables["clocks"].to_dict("records")
     assert (row["run"], row["log"], row["reference_log"], row["method"]) == ("up", "b.h5", "a.h5", "shared")
-    assert row["offset_s"] == pytest.approx(OFFSET_S, abs=0.05 / RATES_HZ[0])
-    assert row["drift_ppm"] == pytest.approx(20.0, abs=0.5)
+    source = "known input: one signal on two recorders of known clocks, in a made-up campaign"
+    conformance("offset of a recorder, by the analysis", OFFSET_S, row["offset_s"], 0.05 / RATES_HZ[0], "s", source)
+    conformance("drift of a recorder, by the analysis", 20.0, row["drift_ppm"], 0.5, "ppm", source)
     assert row["axis_error_samples"] < 0.1
     recording = found.runs[0].recording
     mic, motor = recording["mic"], recording["motor"]
@@ -104,7 +105,8 @@ def test_two_recorders_are_put_on_one_axis(tmp_path):
     levels = order_levels(found)
     assert levels
     truth = 20.0 * np.log10(0.2 / np.sqrt(2.0) / 20e-6)
-    assert np.median(list(levels.values())) == pytest.approx(truth, abs=0.2)
+    median, source = np.median(list(levels.values())), "known input: an order of known level, its tacho on another recorder"
+    conformance("order by the tacho of another recorder", truth, median, 0.2, "dB", source)
 
 
 def test_the_report_says_how_the_logs_lie(tmp_path):

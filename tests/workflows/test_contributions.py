@@ -70,6 +70,7 @@ def test_known_contributions_come_back_in_bands(found, made, conformance):
         1.0,
         "dB",
         "known input: simulated drive of known contributions",
+        "a statistical estimate from short records, and stated with its interval",
     )
     assert error.max() < 3.0
     inside = (known["low_db"] <= true) & (true <= known["high_db"])

@@ -39,12 +39,13 @@ def test_microphones_that_are_doubtful_by_calibrator_are_said(tmp_path):
     assert {doubt.split(":")[0] for doubt in doubts if "by calibrator" in doubt} == {"channel left", "channel far"}
 
 
-def test_the_4_m_level_is_the_energy_mean_over_runs_and_receivers(tmp_path):
+def test_the_4_m_level_is_the_energy_mean_over_runs_and_receivers(tmp_path, conformance):
     levels = {"a1": ("a", {"left": 80.0, "right": 90.0, "far": 60.0}), "a2": ("a", {"left": 80.0, "right": 90.0})}
     channels = mic("left", distance_m=4.0) + mic("right", distance_m=4.19) + mic("far", distance_m=7.5)
     levels["a2"][1]["far"] = 60.0
     (datum,), doubts = campaign_of(tmp_path, levels, channels).levels()
-    assert datum.level_db == pytest.approx(87.404, abs=0.01)
+    source = "analytic: 10 lg of the mean energy of 80 and 90 dB"
+    conformance("level at 4 m of two receivers and two runs", 87.404, datum.level_db, 0.01, "dB", source)
     assert (datum.receiver.name, datum.receiver.distance_m, datum.receiver.position_m) == ("4 m", 4.0, None)
     assert (datum.what, datum.band_hz, datum.group, datum.origin) == ("overall", None, "a", "measured")
     assert doubts == []

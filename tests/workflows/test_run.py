@@ -3,18 +3,23 @@
 import importlib.util
 import json
 import re
+from io import BytesIO
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import pandas as pd
 import pytest
+from babel.messages.pofile import read_po, write_po
 from plain_fleets import plain_campaign, plain_fleet
 from small_campaigns import HEAD, MIC, files_of, fleet_campaign, run_table, small_campaign, table
 
 import tdacoustic as td
 from tdacoustic.fleet import fleet_toml, load_fleet
-from tdacoustic.reporting.document import Details, Notice, Section, Sentences, Table, walk
+from tdacoustic.reporting.document import Details, FigureBlock, Notice, Paragraph, Section, Sentences, Table, walk
+from tdacoustic.reporting.language import read_language, speaking
 from tdacoustic.reporting.run_report import run_report
+from tdacoustic.results.campaign_calibration import settings_in_force
 
 ROOT = Path(__file__).resolve().parents[2]
 CHECKER = ROOT.parent / "shared" / "check_outputs.py"
@@ -98,9 +103,15 @@ def test_the_prediction_is_with_the_calibrated_fleet_where_the_campaign_was_and_
 
 
 def test_the_settings_name_the_parameters_that_were_fitted(demonstration):
-    fitted = {parameter.key for parameter in demonstration.calibration.calibration.parameters}
-    free = demonstration.settings["calibration.free"]
-    assert isinstance(free, list) and set(free) <= fitted and "model.structure_gain_db" in free
+    fitted = tuple(parameter.key for parameter in demonstration.calibration.calibration.parameters)
+    own = {parameter.name for parameter in demonstration.campaign.calibration.parameter}
+    assert demonstration.settings["calibration.free"] == [key for key in fitted if key not in own]
+    other = SimpleNamespace(calibration=SimpleNamespace(parameters=[SimpleNamespace(key="model.structure_gain_db")]))
+    campaign = demonstration.campaign
+    freed = settings_in_force(campaign, other)["calibration.free"]
+    stated = "free" in campaign.calibration.model_fields_set
+    assert freed == (campaign.settings["calibration.free"] if stated else ("model.structure_gain_db",))
+    assert settings_in_force(campaign, None) == campaign.settings
 
 
 def test_one_report_with_three_parts_and_one_provenance(demonstration):
@@ -290,3 +301,51 @@ def test_torques_of_the_runs_stand_in_for_a_law_that_the_fleet_lacks(tda, tmp_pa
         block for block in walk(run_report(td.run(campaign)).sections) if getattr(block, "id", "") == "model-conditions"
     )
     assert "+900 N m of one motor, as the runs state it" in overview.blocks[0].text
+
+
+# ---------------------------------------------------------------- another language
+
+
+DATA = re.compile(
+    r"\b(motor|gearbox|mic)_\w+|\b[a-z_]+\.[a-z_]+\b|\[model\] gear_path = \"\w+\"|\b(dB|Hz|kHz|re|Pa|mm|km/h|rpm|µm|kW|kg|ms|SHA-256|pW)\b"
+)
+"""Names of the demonstration's channels, keys of files, units."""
+
+
+def texts_of(document):
+    """Texts of a report, but not those of cells and lists, which hold data and doubts of the analysis."""
+    for block in walk((*document.summary, *document.sections)):
+        if isinstance(block, Section):
+            yield block.title
+        elif isinstance(block, Paragraph):
+            yield block.text
+        elif isinstance(block, Details):
+            yield block.summary
+        elif isinstance(block, Table):
+            yield from (block.caption, *(column.title for column in block.columns))
+        elif isinstance(block, FigureBlock):
+            figure = block.figure
+            yield from (figure.title, figure.caption, figure.x_axis.label, figure.y_axis.label)
+
+
+def test_every_text_of_the_report_can_be_in_another_language(demonstration, tmp_path):
+    """In a language that puts every text in brackets, what stands outside of them nobody could translate."""
+    catalog = read_po(BytesIO((ROOT / "tdacoustic/reporting/languages/report.pot").read_bytes()), locale="de")
+    for message in catalog:
+        if message.id:
+            plural = isinstance(message.id, tuple)
+            message.string = tuple(f"⟦{text}⟧" for text in message.id) if plural else f"⟦{message.id}⟧"
+    with (tmp_path / "brackets.po").open("wb") as stream:
+        write_po(stream, catalog)
+    with speaking(read_language(tmp_path / "brackets.po")):
+        document = run_report(demonstration)
+    held = list(texts_of(document))
+    assert len(held) > 300
+    forgotten = {}
+    for text in held:
+        outside = re.sub(r"⟦([^⟦⟧.]+), (?=⟦)", r"\1, ", text)  # names are cut at their comma, with the bracket
+        while outside != (outside := re.sub(r"⟦[^⟦⟧]*⟧", " ", outside)):
+            pass
+        if left := re.findall(r"[^\W\d_]{3,}", DATA.sub(" ", outside)):
+            forgotten[text] = left
+    assert not forgotten, "\n".join(f"{text!r}: {left}" for text, left in forgotten.items())
