@@ -28,6 +28,7 @@ AREAS = {
     "contributions": "Coherence and contributions",
     "attribution": "Sources of the noise lines",
     "measured": "Steps of the measured side",
+    "synthesis": "Synthetic logs",
     "fleet": "Kinematics of the drive",
     "gears": "Gears: geometry, stiffness, dynamics, meshing noise",
     "motor": "Motor: frame and radiation",

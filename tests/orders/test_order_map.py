@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.signal
 from made_up_run_ups import RunUp, db
 
 from tdacoustic.errors import AnalysisError

@@ -52,7 +52,9 @@ def test_a_sensitivity_that_is_wrong_by_3_db_is_said_and_not_changed(tda, tmp_pa
     assert code == 0
     assert "channel 'mic': read -3.00 dB off the stated scale, more than 0.5 dB: a peak value taken for an rms" in err
     deviation_db = float(the(tables, kind="calibration")["deviation_db"])
-    conformance("error of a sensitivity stated 3 dB too high", -3.0, deviation_db, 0.002, "dB", PUT_IN)
+    conformance(
+        "reading of a calibrator where the sensitivity is stated 3 dB too high", -3.0, deviation_db, 0.002, "dB", PUT_IN
+    )
     assert the(tables, run="cal before")["verdict"] == "warning"
     assert level_db(tables) == pytest.approx(TRUE_DB - 3.0, abs=0.005)
     assert tables["levels"][0]["calibration"] == "doubtful"
