@@ -98,7 +98,8 @@ def test_floor_density_is_the_prescribed_one(base, conformance):
         # mean of m exponential ratios: standard deviation 1/sqrt(m); 4.5 of them hold for 99.999 %
         tolerance, ratio = 4.5 / np.sqrt(inside.sum()), np.mean(density[inside] / expected)
         note = "four and a half times the scatter of so few lines" if tolerance > 0.1 else ""
-        conformance(f"floor of a synthetic log, {low} to {high} Hz, over that asked for", 1.0, ratio, tolerance, "1", ASKED, note)
+        what = f"floor of a synthetic log, {low} to {high} Hz, over that asked for"
+        conformance(what, 1.0, ratio, tolerance, "1", ASKED, note)
 
 
 def test_a_hump_stands_on_the_floor_at_its_height(base):
