@@ -41,7 +41,12 @@ def test_third_octaves_have_nominal_names_and_lines_enough(conformance):
     assert [band.name for band in bands][:3] == ["63 Hz", "80 Hz", "100 Hz"]  # 50 Hz is 11.6 Hz wide
     kilo = next(band for band in bands if band.name == "1000 Hz")
     conformance(
-        "lower edge of 1 kHz", 891.251, kilo.low_hz, 0.001, "Hz", "standard: IEC 61260-1:2014, band edges, base ten"
+        "lower edge of the third octave at 1 kHz",
+        891.251,
+        kilo.low_hz,
+        0.001,
+        "Hz",
+        "standard: IEC 61260-1:2014, band edges, base ten",
     )
     assert bands[-1].high_hz <= 3000.0
 

@@ -250,7 +250,7 @@ def test_a_cavity_with_one_flexible_wall_is_what_finite_elements_of_the_air_give
         0.0,
         worst,
         2e-3,
-        "",
+        "1",
         "program: NGSolve, air by finite elements",
     )
 

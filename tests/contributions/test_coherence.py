@@ -114,7 +114,7 @@ def test_significance_of_none_at_all(conformance):
     """Carter 1987: 1 - level^(1/(n-1)); and signals without coherence exceed it as often."""
     got = significant_coherence(20.0)
     conformance(
-        "5 % level, 20 averages",
+        "coherence that noise alone exceeds in 5 %, 20 averages",
         1.0 - 0.05 ** (1.0 / 19.0),
         got,
         1e-12,

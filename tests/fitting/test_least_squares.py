@@ -80,10 +80,15 @@ def test_a_prior_is_one_more_datum(conformance):
     # weights 2²/0.25 = 16 and 4: a = (16·2 + 4·1)/20 = 1.8, sigma 1/√20
     found = fit(lambda v: np.array([(2.0 * v["a"] - 4.0) / 0.5]), [FreeParameter("a", 0.0, prior=(1.0, 0.5))])
     conformance(
-        "a with a prior", 1.8, found.values["a"], 1e-9, "1", "analytic: one datum and a Gaussian prior, by hand"
+        "parameter fitted with a prior",
+        1.8,
+        found.values["a"],
+        1e-9,
+        "1",
+        "analytic: one datum and a Gaussian prior, by hand",
     )
     conformance(
-        "its standard error",
+        "standard error of a parameter fitted with a prior",
         20.0**-0.5,
         found.standard_errors()["a"],
         1e-9,

@@ -69,7 +69,14 @@ def test_multipliers_of_meissners_equation(ratio, damping_ratio, conformance):
     got = (pair[0] + pair[1]).real if abs(pair[0] - pair[1]) > 1e-3 else 2.0 * pair[0].real
     what = f"trace of the monodromy at {ratio} omega_n, zeta = {damping_ratio}"
     # At most 0.3 rad a step, where the series of the exponential leaves 0.3^7/7! = 4e-8; the masses give way by 1e-7.
-    conformance(what, trace, got, 3e-6, "1", "analytic: Meissner's equation")
+    conformance(
+        what,
+        trace,
+        got,
+        3e-6,
+        "1",
+        "analytic: Meissner's equation, a stiffness of two values: product of two transfer matrices",
+    )
     # Near a double multiplier its root of that.
     assert np.abs(np.array(pair) - expected).max() < (3e-6 if abs(expected[0] - expected[1]) > 0.1 else 2e-3)
 
@@ -97,7 +104,14 @@ def test_instability_near_twice_the_natural_frequency_has_meissners_limits(dampi
         got = brentq(lambda ratio: largest(system, ratio * unit) - above, exact - 0.02, exact + 0.02, xtol=1e-9)
         what = f"{side} limit of instability over omega_n, zeta = {damping_ratio}"
         # As the multipliers; the trace changes by about 2 over a unit of the ratio.
-        conformance(what, exact, got, 5e-7, "1", "analytic: Meissner's equation")
+        conformance(
+            what,
+            exact,
+            got,
+            5e-7,
+            "1",
+            "analytic: Meissner's equation, a stiffness of two values: product of two transfer matrices",
+        )
 
 
 @pytest.mark.parametrize(("lines", "damping_ratio"), [

@@ -33,7 +33,7 @@ def spur(teeth, addendum=1.0, clearance=0.25, shift=(0.0, 0.0), pressure_angle_d
 def test_involute_function_is_that_of_the_tables(degrees, printed, conformance):
     source = "literature: tables of inv, e.g. Dudley's Gear Handbook"
     # Half the last printed digit.
-    conformance(f"inv {degrees} deg", printed, involute(math.radians(degrees)), 5e-8, "1", source)
+    conformance(f"involute function of {degrees} deg", printed, involute(math.radians(degrees)), 5e-8, "1", source)
 
 
 @given(st.floats(1e-3, 1.5))
@@ -100,7 +100,12 @@ def test_contact_ratio_of_a_textbook_pair(conformance):
     # z = 20 and 40, module 1, 20 deg: r = 10, 20; r_b = 9.396926, 18.793852; r_a = 11, 21; a sin = 30 x 0.342020
     # sqrt(121 - 88.302222) = 5.718197; sqrt(441 - 353.208889) = 9.369691; minus 10.260604 = 4.827284; p_b = 2.952131
     conformance(
-        "contact ratio, z = 20/40", 1.635186, spur((20, 40)).transverse_contact_ratio, 1e-6, "1", "analytic: by hand"
+        "contact ratio, z = 20/40",
+        1.635186,
+        spur((20, 40)).transverse_contact_ratio,
+        1e-6,
+        "1",
+        "analytic: transverse contact ratio of ISO 21771, by hand",
     )
 
 
@@ -112,7 +117,12 @@ def test_contact_ratio_tends_to_that_of_two_racks(pressure_angle_deg, printed, c
     got = spur((10**6, 10**6), pressure_angle_deg=pressure_angle_deg).transverse_contact_ratio
     # The next term of the expansion in 1/z is of size 4/z.
     conformance(
-        f"contact ratio of racks, {pressure_angle_deg} deg", limit, got, 2e-5, "1", "analytic: 4 / (pi sin 2 alpha)"
+        f"contact ratio of racks, {pressure_angle_deg} deg",
+        limit,
+        got,
+        2e-5,
+        "1",
+        "analytic: addendum of one module between two racks, 4 / (pi sin 2 alpha)",
     )
 
 

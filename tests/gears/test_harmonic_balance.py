@@ -70,7 +70,10 @@ def test_constant_stiffness_answers_each_harmonic_of_the_error_alone(conformance
         assert expected == pytest.approx(closed, rel=1e-10, abs=1e-20)
         if amplitude:
             what = f"amplitude of delta at harmonic {k} under a sine of transmission error"
-            got, source = 2e6 * abs(found.displacement_m[k]), "analytic: constant stiffness"
+            got, source = (
+                2e6 * abs(found.displacement_m[k]),
+                "analytic: linear vibration of gears on bearings, mesh stiffness constant",
+            )
             conformance(what, 2e6 * abs(closed), got, 1e-9 * 2e6 * abs(closed), "um", source)
     assert np.abs(found.displacement_m[5:]).max() < 1e-20
     assert found.displacement_m[0].real == pytest.approx(
@@ -405,7 +408,14 @@ def test_resonance_peaks_of_separating_teeth_lie_on_the_backbone(damping_ratio, 
     free_hz, in_contact = backbone(highest, static, omega_n)
     what = f"peak over natural frequency, e = {level} q_s, zeta = {damping_ratio}"
     # Two steps of the sweep; damping and error shift it by their squares.
-    conformance(what, free_hz / natural_hz, at / natural_hz, 2e-3, "1", "analytic: free vibration with flight")
+    conformance(
+        what,
+        free_hz / natural_hz,
+        at / natural_hz,
+        2e-3,
+        "1",
+        "analytic: free vibration of one mass with play, half a period of contact and a flight",
+    )
     # 128 samples a period, and the error's part in when teeth touch.
     assert contact == pytest.approx(in_contact, abs=0.02)
 

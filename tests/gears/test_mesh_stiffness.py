@@ -24,8 +24,12 @@ def test_spur_pair_by_hand(conformance):
     # = 2 (9.369691 - 6.840403) / 2.952131 = 1.713534; c_g = 13.549783 (0.75 x 1.713534 + 0.25) = 20.800961
     found = mesh_stiffness(SPUR)
     source = "standard: ISO 6336-1, method B, by hand"
-    conformance("c', z = 40/40", 13.549783, found.single_n_per_m2 / N_PER_MM_UM, 1e-6, "N/(mm um)", source)
-    conformance("c_gamma, z = 40/40", 20.800961, found.mesh_n_per_m2 / N_PER_MM_UM, 1e-5, "N/(mm um)", source)
+    conformance(
+        "tooth stiffness c', z = 40/40", 13.549783, found.single_n_per_m2 / N_PER_MM_UM, 1e-6, "N/(mm um)", source
+    )
+    conformance(
+        "mesh stiffness c_gamma, z = 40/40", 20.800961, found.mesh_n_per_m2 / N_PER_MM_UM, 1e-5, "N/(mm um)", source
+    )
     assert found.normal_n_per_m == pytest.approx(found.mesh_n_per_m2 * 0.02, rel=1e-14)
     assert found.doubts == ()
 
@@ -40,7 +44,14 @@ def test_shifted_helical_pair_by_hand(conformance):
     found = mesh_stiffness(SHIFTED)
     source = "standard: ISO 6336-1, method B, by hand"
     # Seven digits of the hand's figures.
-    conformance("c', z = 25/60, 15 deg", 14.069906, found.single_n_per_m2 / N_PER_MM_UM, 2e-5, "N/(mm um)", source)
+    conformance(
+        "tooth stiffness c', z = 25/60, 15 deg",
+        14.069906,
+        found.single_n_per_m2 / N_PER_MM_UM,
+        2e-5,
+        "N/(mm um)",
+        source,
+    )
 
 
 def test_first_example_of_the_technical_report(conformance):
@@ -62,9 +73,16 @@ def test_typical_gears_have_about_the_simplified_stiffness(teeth, helix_deg, shi
     pair = GearGeometry(teeth, 4e-3, math.radians(20), math.radians(helix_deg), shift, 1.0, 0.25, 0.05)
     found = mesh_stiffness(pair)
     source = "standard: ISO 6336-1, method C"
-    conformance(f"c', {teeth}, {helix_deg} deg", 14.0, found.single_n_per_m2 / N_PER_MM_UM, 1.4, "N/(mm um)", source)
+    conformance(
+        f"tooth stiffness c', {teeth}, {helix_deg} deg",
+        14.0,
+        found.single_n_per_m2 / N_PER_MM_UM,
+        1.4,
+        "N/(mm um)",
+        source,
+    )
     rough, mesh = "method C is one value for all gears, rough by its own word", found.mesh_n_per_m2 / N_PER_MM_UM
-    conformance(f"c_gamma, {teeth}, {helix_deg} deg", 20.0, mesh, 3.0, "N/(mm um)", source, rough)
+    conformance(f"mesh stiffness c_gamma, {teeth}, {helix_deg} deg", 20.0, mesh, 3.0, "N/(mm um)", source, rough)
 
 
 @given(st.floats(0.05, 0.5), st.floats(17.0, 25.0))

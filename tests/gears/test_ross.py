@@ -181,4 +181,5 @@ def test_mesh_stiffness_of_integrated_teeth(conformance, ross, which):
     name = f"{first}/{second} teeth of {1e3 * module:g} mm"
     conformance(f"contact ratio, {name}", ratio, pair.transverse_contact_ratio, 1e-9, "1", ross["source"])
     ours = mesh_stiffness(pair).normal_n_per_m
-    conformance(f"mean mesh stiffness, {name}", stiffness, ours, 0.15 * stiffness, "N/m", ross["source"])
+    note = "two theories; ISO 6336 says of its own that teeth were measured 20 % softer"
+    conformance(f"mean mesh stiffness, {name}", stiffness, ours, 0.15 * stiffness, "N/m", ross["source"], note)

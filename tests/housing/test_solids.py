@@ -58,7 +58,14 @@ def test_a_cantilever_swings_as_a_beam(cantilever, conformance):
     assert len(found) == 4
     for number, (one, got) in enumerate(zip(sorted(expected), found, strict=True)):
         # Euler and Bernoulli leave out shear and turning, 0.6 % at the second modes here
-        conformance(f"cantilever, mode {number + 1}", one, got, 0.008 * one, "Hz", "analytic: Euler-Bernoulli beam")
+        conformance(
+            f"cantilever, mode {number + 1}",
+            one,
+            got,
+            0.008 * one,
+            "Hz",
+            "analytic: Euler-Bernoulli beam, clamped and free",
+        )
 
 
 @pytest.mark.parametrize("thickness_m", [0.05, 0.1])

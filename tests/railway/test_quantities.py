@@ -79,7 +79,14 @@ def test_the_pass_by_level_of_a_line_of_sources(passing, conformance):
     exposure = transit_exposure(passing, 0, WAYSIDE, PASSAGE, ISO_3095_2013)
     t = np.linspace(0.0, SECONDS, 200001)
     expected = 10.0 * math.log10(0.5 * np.mean(line_of_sources(t)) * SECONDS / TP_S / 20e-6**2)
-    conformance("TEL of the same", expected, exposure.level_db, 0.02, "dB", source + "; ISO 3095:2005, formula (10)")
+    conformance(
+        "TEL of a unit of 100 m at 80 km/h, 7.5 m",
+        expected,
+        exposure.level_db,
+        0.02,
+        "dB",
+        source + "; ISO 3095:2005, formula (10)",
+    )
     assert expected == pytest.approx(10.0 * math.log10(0.5 / 20e-6**2), abs=0.2)
     assert got.state == "met" and set(states(got).values()) == {"met"}
 
@@ -151,7 +158,9 @@ def test_a_near_background_is_corrected_beside_the_level_and_never_in_it(passing
     got = pass_by(passing, 0, near, PASSAGE, ISO_3095_2013)
     assert got.level_db == plain.level_db and plain.corrected_db is None
     source = "standard: ISO 3095:2013, D.4.2, formula (D.1), as quoted by the program phonometry"
-    conformance("background 6 dB below", -1.26, got.corrected_db - got.level_db, 0.005, "dB", source)
+    conformance(
+        "level corrected for a background 6 dB below", -1.26, got.corrected_db - got.level_db, 0.005, "dB", source
+    )
     too_near = Conditions(**{**WAYSIDE.__dict__, "background_db": plain.level_db - 3.0})
     assert pass_by(passing, 0, too_near, PASSAGE, ISO_3095_2013).corrected_db is None
 

@@ -26,7 +26,7 @@ TABLE_G2 = (  # correction and standard uncertainty of each input, dB: ISO 3095:
 def test_the_printed_budget(conformance):
     got = expanded_uncertainty_db(55.0, [row[0] for row in TABLE_G2], [row[1] for row in TABLE_G2])
     source = "standard: ISO 3095:2013, table G.2, as quoted by the program phonometry"
-    conformance("level of the budget", 55.68, got.level_db, 0.005 + 1e-9, "dB", source)
+    conformance("level of the printed budget of uncertainty", 55.68, got.level_db, 0.005 + 1e-9, "dB", source)
     conformance("standard uncertainty", 0.83, got.standard_db, 0.005, "dB", source)
     conformance("expanded uncertainty", 1.66, got.expanded_db, 0.01, "dB", source)
 

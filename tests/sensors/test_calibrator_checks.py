@@ -30,11 +30,32 @@ def check(*plateaus, scale=STATED, **keys):
 
 
 def test_what_calibrators_give(conformance):
-    conformance("94 dB re 20 uPa", 1.00237, parse_calibrator("94 dB").rms, 5e-6, "Pa", "analytic: 20 uPa x 10^(94/20)")
-    conformance("1 Pa", 93.9794, parse_calibrator("1 Pa").level_db, 5e-5, "dB", "analytic: 20 lg(1 Pa / 20 uPa)")
-    conformance("1 g peak", 6.93435, parse_calibrator("1 g peak").rms, 5e-6, "m/s²", "analytic: 9.80665 m/s² / sqrt 2")
     conformance(
-        "usual frequency",
+        "pressure of a calibrator of 94 dB",
+        1.00237,
+        parse_calibrator("94 dB").rms,
+        5e-6,
+        "Pa",
+        "analytic: 20 uPa x 10^(94/20)",
+    )
+    conformance(
+        "level of a calibrator of 1 Pa",
+        93.9794,
+        parse_calibrator("1 Pa").level_db,
+        5e-5,
+        "dB",
+        "analytic: 20 lg(1 Pa / 20 uPa)",
+    )
+    conformance(
+        "rms of a calibrator of 1 g peak",
+        6.93435,
+        parse_calibrator("1 g peak").rms,
+        5e-6,
+        "m/s²",
+        "analytic: 9.80665 m/s² / sqrt 2",
+    )
+    conformance(
+        "frequency of a calibrator of vibration",
         1000 / (2 * math.pi),
         parse_calibrator("10 m/s^2").usual_hz[0],
         1e-3,

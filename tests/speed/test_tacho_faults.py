@@ -105,7 +105,7 @@ def test_a_bandwidth_that_is_asked_for_is_kept(conformance):
     inside = (reading.times_s > 2.0) & (reading.times_s < 18.0)
     swing = 2.0 * np.abs(np.mean(((reading.speed - 10.0) * wave)[inside]))
     conformance(
-        "swing of 0.2 turns/s through 2 Hz",
+        "swing of the speed of 0.2 turns/s after smoothing to 2 Hz",
         0.2 * 2.0**-0.125,
         float(swing),
         2e-3,

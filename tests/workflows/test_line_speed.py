@@ -313,7 +313,9 @@ def test_slip_is_told_where_train_and_motor_are_known(tmp_path, conformance):
     analysis = analysed(path)
     (row,) = analysis.tables["slip"].to_dict("records")
     assert (row["train_channel"], row["shaft_channel"], row["shaft"]) == ("gps", "tacho", "motor")
-    conformance("usual slip", 0.01, row["usual_slip"], 5e-4, "1", "known input: wheel and train of known slip")
+    conformance(
+        "usual slip, by the analysis", 0.01, row["usual_slip"], 5e-4, "1", "known input: wheel and train of known slip"
+    )
     assert row["n_events"] == 1 and row["worst_event"] == "slip"
     assert (row["worst_slip"], row["worst_from_s"], row["worst_to_s"]) == pytest.approx((0.05, 6.0, 8.0), abs=0.1)
     assert row["reason"] is None or row["reason"] != row["reason"]

@@ -167,7 +167,7 @@ def test_what_repeats_with_every_turn_of_a_steady_run(tmp_path, conformance):
     conformance("mesh in the synchronous average of a run", 20.0 * np.log10(0.1 / 20e-6), first["level_db"], 0.05, "dB",
                 PUT_IN)  # fmt: skip
     rest = 20.0 * np.log10(0.1 / np.sqrt(2.0) / 20e-6)
-    conformance("what does not repeat", rest, first["residual_db"], 0.1, "dB", PUT_IN)
+    conformance("what does not repeat with the turns of a run", rest, first["residual_db"], 0.1, "dB", PUT_IN)
     assert first["harmonic"] == 31.0 and first["turns"] > 390
     orders = analysis.tables["orders"]
     (mesh,) = orders[orders["name"] == "mesh x1"].to_dict("records")
