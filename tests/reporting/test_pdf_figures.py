@@ -8,7 +8,7 @@ from PIL import Image
 from read_pdf import ReadPdf
 from report_figures import bars, heatmap, spectrum
 
-from tdacoustic.reporting import Axis, Document, Figure, FigureBlock, Line, Markers, Section
+from tdacoustic.reporting import Axis, Bars, Document, Figure, FigureBlock, Line, Markers, Section
 from tdacoustic.reporting.matplotlib_renderer import render_png
 from tdacoustic.reporting.pdf import render_pdf
 from tdacoustic.reporting.pdf.figures import MOST_LINE_BYTES
@@ -49,6 +49,18 @@ def test_a_figure_looks_as_matplotlib_draws_it(figure: Figure) -> None:
     _, column, alike = place(drawn, page)
     assert alike > (0.97 if figure.name == "map" else 0.85)  # thin lines and letters differ by their grey edges
     assert column == pytest.approx(38.4 * DPI / 72.0, abs=2)  # at the left margin, in full size
+
+
+@pytest.mark.parametrize("hatch", ["/", "x", "."])
+def test_hatches_are_those_that_matplotlib_draws(hatch: str) -> None:
+    figure = Figure("b", "B", "", Axis("Condition"), Axis("Share", "%"), [Bars(["1"], [100.0], "a", hatch=hatch)])
+    with Image.open(io.BytesIO(render_png(figure, DPI))) as opened:
+        drawn = np.asarray(opened.convert("L"), dtype=np.float64)
+    row, column = drawn.shape[0] // 2, drawn.shape[1] // 2
+    inside = drawn[row - 60 : row + 60, column - 60 : column + 60]
+    assert inside.std() > 10.0  # nothing but the hatched bar
+    _, _, alike = place(inside, read(figure).ink(1, DPI).astype(np.float64))
+    assert alike > 0.8
 
 
 def test_lines_are_lines_and_letters_are_letters() -> None:

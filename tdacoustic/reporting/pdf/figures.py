@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias, cast
 
 import numpy as np
 from matplotlib.backend_bases import GraphicsContextBase, RendererBase
+from matplotlib.colors import to_rgb
 from matplotlib.path import Path as Outline
+from matplotlib.transforms import Affine2D
 from PIL import Image
 from reportlab.lib.utils import ImageReader
 from reportlab.pdfgen.canvas import Canvas
@@ -37,6 +39,9 @@ HIGHEST: Final = 600.0
 LINE_DPI: Final = 300
 MOST_LINE_BYTES: Final = 300_000
 """Of the path operators of a figure, before compression; the lines of one with more become a picture [assumed]."""
+
+HATCH_PT: Final = 72.0
+"""Side of the square that matplotlib repeats a hatch by."""
 
 _CAPS: Final = {"butt": 0, "round": 1, "projecting": 2}
 _JOINS: Final = {"miter": 0, "round": 1, "bevel": 2}
@@ -126,6 +131,21 @@ class _Recorder(RendererBase):
         of_fill = rgbFace[3] if filled and len(rgbFace) > 3 else 1.0
         stroke_alpha, fill_alpha = (gc.get_rgb()[3], of_fill) if alpha is None else (alpha, alpha)
         self.kept.append(_Strokes("\n".join([*before, lines, ends]), float(stroke_alpha), float(fill_alpha)))
+        if filled and gc.get_hatch():
+            self._keep_hatch(gc, path.get_extents(transform).extents, lines)
+
+    def _keep_hatch(self, gc: GraphicsContextBase, box: Sequence[float], outline: str) -> None:
+        """Keep a hatch in squares over a box, cut by the outline that it fills."""
+        left, bottom, right, top = (float(end) / HATCH_PT for end in box)
+        squares = [
+            Affine2D().scale(HATCH_PT).translate(HATCH_PT * column, HATCH_PT * row)
+            for column in range(math.floor(left), math.ceil(right))
+            for row in range(math.floor(bottom), math.ceil(top))
+        ]
+        ink = " ".join(_short(part) for part in to_rgb(gc.get_hatch_color()))
+        pen = f"{ink} RG {ink} rg {_short(gc.get_hatch_linewidth())} w"
+        drawn = [_operators(gc.get_hatch_path(), square, None) for square in squares]
+        self.kept.append(_Strokes("\n".join([*_clipping(gc), outline, "W n", pen, *drawn, "B"]), 1.0, 1.0))
 
     def draw_image(self, gc: GraphicsContextBase, x: float, y: float, im: Any, transform: Any = None) -> None:
         """Keep a picture, in few colours: a quarter of the bytes."""
