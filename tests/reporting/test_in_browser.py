@@ -21,6 +21,7 @@ from tdacoustic.reporting import (
     Column,
     Details,
     Document,
+    Facts,
     Figure,
     FigureBlock,
     Heatmap,
@@ -30,7 +31,7 @@ from tdacoustic.reporting import (
     Section,
     Table,
 )
-from tdacoustic.reporting.document import Alternatives, Shown
+from tdacoustic.reporting.document import Alternatives, House, Shown
 from tdacoustic.reporting.html import render_html
 
 SYSTEM = ("chromium", "chromium-browser", "google-chrome")
@@ -363,6 +364,19 @@ def test_a_phone_shows_it_without_scrolling_sideways(chromium, address):
     with opened(chromium, address, **how) as page:
         drawn(page, "spectrum-1")
         assert page.evaluate("document.documentElement.scrollWidth") <= 360
+
+
+@pytest.mark.parametrize("width", [360, 1280])
+def test_a_name_without_spaces_does_not_widen_the_page(chromium, tmp_path, width):
+    name = 200 * "C"
+    blocks = [Paragraph(name), Notice("warning", name), Facts([(name, name)]), FigureBlock(spectrum("s", name))]
+    blocks.append(Table("t", name, (Column("step", name),), [(name,)]))
+    house = House(company=name, lines=(name,))
+    document = Document(name, name, "measured", sections=[Section("one", name, blocks)], house=house)
+    path = tmp_path / "report.html"
+    path.write_text(render_html(document), encoding="utf-8", newline="\n")
+    with opened(chromium, path.as_uri(), viewport={"width": width, "height": 740}) as page:
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
 
 
 def test_a_phone_shows_the_answer_on_its_first_screen(chromium, address):
