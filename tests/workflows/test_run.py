@@ -19,6 +19,7 @@ from tdacoustic.fleet import fleet_toml, load_fleet
 from tdacoustic.reporting.document import Details, FigureBlock, Notice, Paragraph, Section, Sentences, Table, walk
 from tdacoustic.reporting.language import read_language, speaking
 from tdacoustic.reporting.run_report import run_report
+from tdacoustic.reporting.sections.run_answer import _verdict_line
 from tdacoustic.results.campaign_calibration import settings_in_force
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -100,6 +101,20 @@ def test_the_prediction_is_with_the_calibrated_fleet_where_the_campaign_was_and_
     for fitted in result.calibration.calibration.levels:
         (level,) = total[total["condition"] == fitted.datum.condition.name]["level_db"]
         assert level == pytest.approx(fitted.predicted_db, abs=0.05)
+
+
+@pytest.mark.parametrize(
+    ("leading", "confidence", "said"),
+    [
+        (None, None, "undecided, for none of the noise lines, which are 41 % of the sound energy, could be given to"),
+        ("unassigned", 0.7, "undecided, for most of the energy of the noise lines, which are 41 % of the sound energy"),
+        ("gearbox", 0.7, "undecided, the gearbox leads the noise lines (P\u00a00.70), which are 41 % of the sound"),
+    ],
+)
+def test_an_undecided_condition_says_why(demonstration, leading, confidence, said):
+    given = {"condition": "1", "dominant": "undecided", "line_fraction": 0.41}
+    verdict = SimpleNamespace(**given, leading=leading, confidence=confidence)
+    assert f"km/h, motor 341.9 rpm): {said}" in _verdict_line(demonstration.analysis, verdict)
 
 
 def test_the_settings_name_the_parameters_that_were_fitted(demonstration):

@@ -110,7 +110,19 @@ def _verdict_line(analysis: Analysis, verdict: Dominance) -> str:
         "probability": probability_words(verdict.confidence).replace(" ", "\u00a0"),
         "percent": f"{100.0 * (verdict.line_fraction or 0.0):.0f}",
     }
-    if verdict.dominant == "undecided":
+    if verdict.dominant == "undecided" and verdict.leading is None:
+        words = say(
+            "{condition}: undecided, for none of the noise lines, which are {percent} % of the sound energy, could be "
+            "given to a source",
+            **named,
+        )
+    elif verdict.dominant == "undecided" and verdict.leading == "unassigned":
+        words = say(
+            "{condition}: undecided, for most of the energy of the noise lines, which are {percent} % of the sound "
+            "energy, belongs to no known source (P\u00a0{probability})",
+            **named,
+        )
+    elif verdict.dominant == "undecided":
         words = say(
             "{condition}: undecided, the {source} leads the noise lines (P\u00a0{probability}), which are {percent} % "
             "of the sound energy",
