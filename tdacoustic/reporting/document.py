@@ -218,6 +218,11 @@ class Column:
         if self.digits is not None and not 0 <= self.digits <= 12:
             raise ReportError(f"digits of column {self.key!r} must be 0 to 12, got {self.digits}")
 
+    @property
+    def side(self) -> str:
+        """Where its cells are aligned to."""
+        return self.align or ("right" if self.kind == "number" else "left")
+
 
 @dataclass(frozen=True)
 class Table:

@@ -66,7 +66,7 @@ def _cell(column: Column, cell: Cell, first: bool) -> dict[str, Any]:
     ``order``: what it is sorted by where that is something else; ``words``: what its text downloads as, for a number
     in words.
     """
-    align = column.align or ("right" if column.kind == "number" else "left")
+    align = column.side
     tag = 'th scope="row"' if first and column.kind == "text" else "td"
     view: dict[str, Any] = {"tag": Markup(tag), "end": tag[:2], "align": align}
     view |= dict.fromkeys(("chip", "href", "order", "words"))
@@ -108,7 +108,7 @@ def _table(table: Table, most_bytes: int) -> tuple[dict[str, Any], int]:
             "title": column.title,
             "unit": column.unit,
             "kind": column.kind,
-            "align": column.align or ("right" if column.kind == "number" else "left"),
+            "align": column.side,
             "worded": any(isinstance(row[place], Shown) for row in table.rows),
         }
         for place, column in enumerate(table.columns)

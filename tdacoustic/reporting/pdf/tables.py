@@ -216,12 +216,8 @@ def _part(
 
 def _left_pads(columns: Sequence[Column], pad: float) -> list[float]:
     """Points left of the text of each column."""
-    sides = [_align(column) for column in columns]
+    sides = [column.side for column in columns]
     return [pad + _APART * (at > 0 and side == "left" and sides[at - 1] == "right") for at, side in enumerate(sides)]
-
-
-def _align(column: Column) -> str:
-    return column.align or ("right" if column.kind == "number" else "left")
 
 
 def _paragraph(marked: str, align: str) -> Paragraph:
@@ -231,7 +227,7 @@ def _paragraph(marked: str, align: str) -> Paragraph:
 def _head(column: Column, fonts: Fonts) -> Paragraph:
     title, unit = (cut_text(text, _MOST_IN_HEAD) for text in (column.title, column.unit))
     below = f"<br/>{muted(markup(_unbroken(unit), fonts))}" if unit else ""
-    return _paragraph(f"{markup(title, fonts, bold=True)}{below}", _align(column))
+    return _paragraph(f"{markup(title, fonts, bold=True)}{below}", column.side)
 
 
 def _shortened(text: str) -> str:
@@ -246,12 +242,10 @@ def _cell(column: Column, cell: Cell, room: float, fonts: Fonts) -> Any:
     """A cell as text where it fits on a line in the regular font, else as a paragraph."""
     text = _shortened(cell_text(column, cell))
     if isinstance(cell, Link):
-        return _paragraph(
-            f'<a href="{cell.href}" color="{colour("series-0")}">{markup(text, fonts)}</a>', _align(column)
-        )
+        return _paragraph(f'<a href="{cell.href}" color="{colour("series-0")}">{markup(text, fonts)}</a>', column.side)
     if fonts.simple(text) and fonts.width(text, CELL) <= room:
         return text
-    return _paragraph(markup(text, fonts), _align(column))
+    return _paragraph(markup(text, fonts), column.side)
 
 
 def _height(cell: Any, room: float) -> float:
@@ -275,5 +269,5 @@ def _look(columns: Sequence[Column], lefts: Sequence[float], pad: float) -> list
         ("LINEBELOW", (0, 1), (-1, -1), 0.3, line),
     ]
     look += [("LEFTPADDING", (i, 0), (i, -1), left) for i, left in enumerate(lefts)]
-    look += [("ALIGN", (i, 0), (i, -1), _align(column).upper()) for i, column in enumerate(columns)]
+    look += [("ALIGN", (i, 0), (i, -1), column.side.upper()) for i, column in enumerate(columns)]
     return look

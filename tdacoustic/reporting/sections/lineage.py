@@ -166,7 +166,12 @@ def settings_words(settings: str) -> str:
     >>> settings_words('{"$type":"a:B","fields":{"overlap":0.5,"orders":{"$tuple":[1.0,31.0]},"mains_hz":null}}')
     'overlap 0.5; orders 1, 31; mains_hz none'
     """
-    return _short("; ".join(f"{key} {words}".strip() for key, words in _fields(settings).items()))
+    return _short(_told(_fields(settings)))
+
+
+def _told(fields: Mapping[str, str]) -> str:
+    """Settings with their keys, one after the other."""
+    return "; ".join(f"{key} {words}".strip() for key, words in fields.items())
 
 
 def _short(text: str) -> str:
@@ -268,9 +273,9 @@ def _settings_told(records: Sequence[Record]) -> list[tuple[str, str]]:
         shared = {key: words for key, words in first.items() if all(held.get(key) == words for _, held in each)}
         differing: dict[str, list[str]] = {}
         for label, held in each:
-            own = "; ".join(f"{key} {words}".strip() for key, words in held.items() if key not in shared)
+            own = _told({key: words for key, words in held.items() if key not in shared})
             differing.setdefault(own, []).append(label)
-        common = "; ".join(f"{key} {words}".strip() for key, words in shared.items())
+        common = _told(shared)
         entries = [(common, [label for label, _ in each]), *differing.items()]
         told += [(f"{step}, {_labels(labels)}", _short(words)) for words, labels in entries if words]
     return told
